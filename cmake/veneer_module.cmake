@@ -1,0 +1,66 @@
+# One rule for every module, so that a module is a dozen lines and its floor cannot be forgotten.
+
+# Options that all of our own targets share.
+add_library(veneer_options INTERFACE)
+target_include_directories(veneer_options INTERFACE ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR}/generated)
+target_compile_options(veneer_options INTERFACE -Wall -Wextra -Wshadow -Wnon-virtual-dtor
+                                                -Wmissing-declarations)
+# g++ 12 warns of overlapping copies in std::string's own operator+ (GCC bug 105651).
+target_compile_options(veneer_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>)
+# x86-64-v2 plus F16C, FMA and AVX2: every machine that can drive a projector with GL 4.5 has them.
+if(CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
+  target_compile_options(veneer_options INTERFACE -march=x86-64-v3)
+endif()
+
+# veneer_add_module(NAME LAYER n SRCS ... [TESTS ...] [DEPS ...] [PRIVATE_DEPS ...] [TEST_DEPS ...])
+#
+# Makes the library veneer::NAME of floor n from SRCS and the test program veneer_NAME_test from
+# TESTS. DEPS and PRIVATE_DEPS name veneer:: modules of lower floors and third-party targets; a
+# module of the same or a higher floor stops the configuration. Headers that reach across floors
+# without linking are caught by tools/check_includes.py, which reads LAYER from here too.
+function(veneer_add_module name)
+  cmake_parse_arguments(M "" "LAYER" "SRCS;TESTS;DEPS;PRIVATE_DEPS;TEST_DEPS" ${ARGN})
+  if(M_UNPARSED_ARGUMENTS OR NOT M_LAYER)
+    message(FATAL_ERROR "veneer_add_module(${name}): LAYER is required; unknown: ${M_UNPARSED_ARGUMENTS}")
+  endif()
+  add_library(veneer_${name} STATIC ${M_SRCS})
+  add_library(veneer::${name} ALIAS veneer_${name})
+  set_property(TARGET veneer_${name} PROPERTY VENEER_LAYER ${M_LAYER})
+  target_link_libraries(veneer_${name} PUBLIC veneer_options ${M_DEPS} PRIVATE ${M_PRIVATE_DEPS})
+  foreach(dep IN LISTS M_DEPS M_PRIVATE_DEPS)
+    if(NOT TARGET ${dep})
+      continue()
+    endif()
+    get_target_property(dep_layer ${dep} VENEER_LAYER)
+    if(dep_layer AND NOT dep_layer LESS M_LAYER)
+      message(FATAL_ERROR "veneer_${name} (floor ${M_LAYER}) may not use ${dep} (floor ${dep_layer})")
+    endif()
+  endforeach()
+  if(VENEER_TESTS AND M_TESTS)
+    add_executable(veneer_${name}_test ${M_TESTS})
+    target_link_libraries(veneer_${name}_test PRIVATE veneer_${name} ${M_TEST_DEPS} GTest::gtest
+                                                      GTest::gmock GTest::gtest_main)
+    add_test(NAME ${name} COMMAND veneer_${name}_test)
+    # Real measured data; tests that need it skip, saying so, where it is absent.
+    set_property(TEST ${name} PROPERTY ENVIRONMENT_MODIFICATION
+      "VENEER_DATA=set:$<IF:$<BOOL:$ENV{VENEER_DATA}>,$ENV{VENEER_DATA},${CMAKE_SOURCE_DIR}/../shared/data>")
+  endif()
+endfunction()
+
+# veneer_embed(TARGET FILE...)
+#
+# Embeds text files (shaders) into TARGET: shaders/x.frag becomes the header "<folder>/shaders/x.frag.inc",
+# a raw string literal to be included where a const char array is initialised.
+function(veneer_embed target)
+  foreach(file IN LISTS ARGN)
+    cmake_path(ABSOLUTE_PATH file BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR} OUTPUT_VARIABLE in)
+    cmake_path(RELATIVE_PATH in BASE_DIRECTORY ${CMAKE_SOURCE_DIR} OUTPUT_VARIABLE relative)
+    set(out ${CMAKE_BINARY_DIR}/generated/${relative}.inc)
+    add_custom_command(
+      OUTPUT ${out}
+      COMMAND ${CMAKE_COMMAND} -DIN=${in} -DOUT=${out} -P ${CMAKE_SOURCE_DIR}/cmake/embed.cmake
+      DEPENDS ${in} ${CMAKE_SOURCE_DIR}/cmake/embed.cmake
+      VERBATIM)
+    target_sources(${target} PRIVATE ${out})
+  endforeach()
+endfunction()
