@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "base/image.h"
+#include "base/result.h"
+
+namespace veneer {
+
+// All writers write whole or not at all (temporary file, then rename) and make missing folders.
+// All readers: kNotFound, kIo, kBadFormat.
+
+[[nodiscard]] Status write_png(const std::filesystem::path& path, ImageView<const Rgb8> image);
+[[nodiscard]] Status write_png(const std::filesystem::path& path, ImageView<const Rgb16> image);
+/// Any PNG as 8-bit RGB: alpha is dropped, grey is spread, 16 bits are cut to 8.
+[[nodiscard]] Result<Image<Rgb8>> read_png(const std::filesystem::path& path);
+/// Any PNG as 16-bit RGB; 8-bit values are spread over the range (255 -> 65535).
+[[nodiscard]] Result<Image<Rgb16>> read_png16(const std::filesystem::path& path);
+/// A baseline or progressive JPEG as 8-bit RGB.
+[[nodiscard]] Result<Image<Rgb8>> read_jpeg(const std::filesystem::path& path);
+
+/// One named float channel of an OpenEXR image, such as "R" or "specular.R".
+struct ExrChannel {
+  std::string name;
+  Image<float> pixels;
+};
+/// @param channels  all of one size; names unique. Stored as 32-bit float, ZIP-compressed.
+[[nodiscard]] Status write_exr(const std::filesystem::path& path,
+                               const std::vector<ExrChannel>& channels);
+/// Three channels named `names` (default R, G, B).
+[[nodiscard]] Status write_exr(const std::filesystem::path& path,
+                               ImageView<const Rgb32f> image,
+                               const std::array<std::string, 3>& names = {"R", "G", "B"});
+/// All channels of the first part, converted to float.
+[[nodiscard]] Result<std::vector<ExrChannel>> read_exr(const std::filesystem::path& path);
+/// The three named channels; kBadFormat where one is missing.
+[[nodiscard]] Result<Image<Rgb32f>> read_exr_rgb(const std::filesystem::path& path,
+                                                 const std::array<std::string, 3>& names = {
+                                                     "R", "G", "B"});
+
+}  // namespace veneer

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/mesh.h"
+
+#include <assimp/Importer.hpp>
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+
+#include <array>
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+namespace veneer {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+struct SurfacePoint {
+  Vector3d position;
+  Vector3d normal;
+};
+
+/// A grid over u, v in [0, 1]; `surface(u, v)` must run anticlockwise: right with u, down with v.
+Mesh tessellate(int columns,
+                int rows,
+                const std::function<SurfacePoint(double u, double v)>& surface) {
+  Mesh mesh;
+  for (int j = 0; j <= rows; ++j) {
+    for (int i = 0; i <= columns; ++i) {
+      const double u = static_cast<double>(i) / columns;
+      const double v = static_cast<double>(j) / rows;
+      const SurfacePoint point = surface(u, v);
+      mesh.positions.push_back(point.position);
+      mesh.normals.push_back(point.normal);
+      mesh.texture_coordinates.emplace_back(u, v);
+    }
+  }
+  const auto vertex = [columns](int i, int j) {
+    return static_cast<std::uint32_t>(j * (columns + 1) + i);
+  };
+  const auto add = [&mesh](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    // At a pole a row has shrunk to a point and half of its triangles have no area.
+    const Vector3d& p = mesh.positions[a];
+    if ((mesh.positions[b] - p).cross(mesh.positions[c] - p).norm() > 1e-12)
+      mesh.triangles.push_back({a, b, c});
+  };
+  for (int j = 0; j < rows; ++j) {
+    for (int i = 0; i < columns; ++i) {
+      add(vertex(i, j), vertex(i, j + 1), vertex(i + 1, j + 1));
+      add(vertex(i, j), vertex(i + 1, j + 1), vertex(i + 1, j));
+    }
+  }
+  return mesh;
+}
+
+Mesh make_plate() {
+  static constexpr double kSide = 0.2;
+  return tessellate(16, 16, [](double u, double v) {
+    return SurfacePoint{{kSide * (u - 0.5), kSide * (0.5 - v), 0}, Vector3d::UnitZ()};
+  });
+}
+
+Mesh make_sphere() {
+  static constexpr double kRadius = 0.1;
+  return tessellate(128, 64, [](double u, double v) {
+    // u = 0.5 faces +z; the seam is at the back.
+    const double azimuth = 2 * std::numbers::pi * (u - 0.5);
+    const double polar = std::numbers::pi * v;
+    const Vector3d normal(
+        std::sin(polar) * std::sin(azimuth), std::cos(polar), std::sin(polar) * std::cos(azimuth));
+    return SurfacePoint{kRadius * normal, normal};
+  });
+}
+
+/// A solid of revolution about y whose outline swells, narrows at the neck and opens again.
+Mesh make_vase() {
+  constexpr double kHeight = 0.25;
+  const auto radius = [](double y) {
+    const double t = y / kHeight + 0.5;
+    return 0.055 + 0.030 * std::sin(1.6 * std::numbers::pi * t + 0.25) + 0.008 * t;
+  };
+  return tessellate(128, 128, [radius](double u, double v) {
+    const double azimuth = 2 * std::numbers::pi * (u - 0.5);
+    const double y = kHeight * (0.5 - v);
+    constexpr double kStep = 1e-6;
+    const double slope = (radius(y + kStep) - radius(y - kStep)) / (2 * kStep);
+    const Vector3d outward(std::sin(azimuth), 0, std::cos(azimuth));
+    return SurfacePoint{radius(y) * outward + y * Vector3d::UnitY(),
+                        (outward - slope * Vector3d::UnitY()).normalized()};
+  });
+}
+
+struct BuiltIn {
+  std::string_view name;
+  Mesh (*make)();
+};
+constexpr std::array kBuiltIns{
+    BuiltIn{"plate", &make_plate}, BuiltIn{"sphere", &make_sphere}, BuiltIn{"vase", &make_vase}};
+
+Vector3d to_eigen(const aiVector3D& v) { return {v.x, v.y, v.z}; }
+
+Status append(const aiMesh& part, const std::string& origin, Mesh& mesh) {
+  if (!part.HasTextureCoords(0)) {
+    return fail(
+        Errc::kBadFormat,
+        "reading {}: the part \"{}\" has no texture coordinates, so no material can be laid on it; "
+        "unwrap it (in Blender: UV > Smart UV Project) and export it again",
+        origin,
+        part.mName.C_Str());
+  }
+  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+  for (unsigned i = 0; i < part.mNumVertices; ++i) {
+    const Vector3d position = to_eigen(part.mVertices[i]);
+    const Vector3d normal = to_eigen(part.mNormals[i]);
+    const Vector3d uv = to_eigen(part.mTextureCoords[0][i]);
+    if (!position.allFinite() || !normal.allFinite() || !uv.allFinite()) {
+      return fail(Errc::kBadFormat,
+                  "reading {}: vertex {} of \"{}\" is not finite",
+                  origin,
+                  i,
+                  part.mName.C_Str());
+    }
+    mesh.positions.push_back(position);
+    mesh.normals.push_back(normal.norm() > 0 ? normal.normalized() : Vector3d::UnitZ().eval());
+    mesh.texture_coordinates.emplace_back(uv.x(), uv.y());
+  }
+  for (unsigned i = 0; i < part.mNumFaces; ++i) {
+    const aiFace& face = part.mFaces[i];
+    if (face.mNumIndices != 3) continue;  // points and lines
+    mesh.triangles.push_back(
+        {first + face.mIndices[0], first + face.mIndices[1], first + face.mIndices[2]});
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<Mesh> load_mesh(const std::filesystem::path& path_or_name) {
+  for (const BuiltIn& built_in : kBuiltIns) {
+    if (path_or_name == built_in.name) return built_in.make();
+  }
+  const std::string origin = path_or_name.string();
+  if (std::error_code error; !std::filesystem::exists(path_or_name, error)) {
+    return fail(Errc::kNotFound,
+                "reading the mesh {}: there is no such file, and the built-in ones are plate, "
+                "sphere and vase",
+                origin);
+  }
+  Assimp::Importer importer;
+  // FlipUVs: files count v from the bottom of the texture, Veneer from its first row.
+  const aiScene* scene = importer.ReadFile(origin,
+                                           aiProcess_Triangulate | aiProcess_GenSmoothNormals |
+                                               aiProcess_JoinIdenticalVertices |
+                                               aiProcess_PreTransformVertices | aiProcess_FlipUVs);
+  if (scene == nullptr)
+    return fail(Errc::kBadFormat, "reading the mesh {}: {}", origin, importer.GetErrorString());
+  Mesh mesh;
+  for (unsigned i = 0; i < scene->mNumMeshes; ++i)
+    VENEER_TRY(append(*scene->mMeshes[i], origin, mesh));
+  if (mesh.triangles.empty())
+    return fail(Errc::kBadFormat, "reading the mesh {}: it has no triangles", origin);
+  return mesh;
+}
+
+}  // namespace veneer
