@@ -1,2 +1,137 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "base/image_files.h"
+
 #include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <limits>
+
+#include "base/files.h"
+#include "base/random.h"
+#include "base/testing/temporary_folder.h"
+
+namespace veneer {
+namespace {
+
+namespace fs = std::filesystem;
+
+template <class Pixel>
+Image<Pixel> noise(int width, int height) {
+  Pcg32 random(7);
+  Image<Pixel> image(width, height);
+  for (Pixel& pixel : image.pixels()) {
+    for (auto& channel : pixel)
+      channel = static_cast<std::remove_reference_t<decltype(channel)>>(random.next());
+  }
+  return image;
+}
+
+template <class Pixel>
+bool same(const Image<Pixel>& a, const Image<Pixel>& b) {
+  return a.width() == b.width() && a.height() == b.height() &&
+         std::ranges::equal(a.pixels(), b.pixels());
+}
+
+TEST(Image, StartsBlackWhateverThePixel) {
+  const Image<Rgb32f> image(3, 2);
+  for (const Rgb32f& pixel : image.pixels()) EXPECT_EQ(pixel, Rgb32f::Zero());
+}
+
+TEST(Png, RoundTripsEightBits) {
+  const TemporaryFolder folder;
+  const auto image = noise<Rgb8>(17, 9);
+  ASSERT_TRUE(write_png(folder.path() / "a.png", image.view()));
+  EXPECT_TRUE(same(read_png(folder.path() / "a.png").value(), image));
+}
+
+TEST(Png, RoundTripsSixteenBits) {
+  const TemporaryFolder folder;
+  const auto image = noise<Rgb16>(5, 31);
+  ASSERT_TRUE(write_png(folder.path() / "a.png", image.view()));
+  EXPECT_TRUE(same(read_png16(folder.path() / "a.png").value(), image));
+}
+
+TEST(Png, WritesAViewWithPadding) {
+  const TemporaryFolder folder;
+  const auto image = noise<Rgb8>(8, 4);
+  const ImageView<const Rgb8> part(image.pixels().data() + 2, 3, 4, 8);
+  ASSERT_TRUE(write_png(folder.path() / "a.png", part));
+  const Image<Rgb8> read = read_png(folder.path() / "a.png").value();
+  ASSERT_EQ(read.width(), 3);
+  EXPECT_EQ(read(1, 2), image(3, 2));
+}
+
+TEST(Png, RefusesDamagedAndMissingFiles) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "a.png";
+  EXPECT_EQ(read_png(path).error().code, Errc::kNotFound);
+  const auto image = noise<Rgb8>(40, 40);
+  ASSERT_TRUE(write_png(path, image.view()));
+  const std::string whole = read_text(path).value();
+  for (const std::size_t kept :
+       {std::size_t{0}, std::size_t{7}, std::size_t{40}, whole.size() / 2}) {
+    ASSERT_TRUE(write_text(path, whole.substr(0, kept)));
+    const auto cut = read_png(path);
+    ASSERT_FALSE(cut) << kept << " bytes kept";
+    EXPECT_EQ(cut.error().code, Errc::kBadFormat);
+  }
+}
+
+TEST(Exr, RoundTripsFloatsBitByBit) {
+  const TemporaryFolder folder;
+  std::vector<ExrChannel> channels{{"a", Image<float>(3, 2)}, {"specular.R", Image<float>(3, 2)}};
+  channels[0].pixels(2, 1) = 1e-30F;
+  channels[0].pixels(0, 0) = std::numeric_limits<float>::infinity();
+  channels[1].pixels(1, 0) = -65505.5F;
+  ASSERT_TRUE(write_exr(folder.path() / "a.exr", channels));
+  const std::vector<ExrChannel> read = read_exr(folder.path() / "a.exr").value();
+  ASSERT_EQ(read.size(), 2U);
+  for (std::size_t c = 0; c < 2; ++c) {
+    EXPECT_EQ(read[c].name, channels[c].name);
+    EXPECT_TRUE(std::ranges::equal(read[c].pixels.pixels(), channels[c].pixels.pixels()));
+  }
+}
+
+TEST(Exr, NamesTheMissingChannel) {
+  const TemporaryFolder folder;
+  const Image<Rgb32f> xyz(2, 2);
+  ASSERT_TRUE(write_exr(folder.path() / "a.exr", xyz.view(), {"X", "Y", "Z"}));
+  EXPECT_TRUE(read_exr_rgb(folder.path() / "a.exr", {"X", "Y", "Z"}));
+  const auto image = read_exr_rgb(folder.path() / "a.exr");
+  ASSERT_FALSE(image);
+  EXPECT_NE(image.error().what.find("channel R"), std::string::npos) << image.error().what;
+}
+
+TEST(Exr, RefusesATruncatedFile) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "a.exr";
+  const Image<Rgb32f> image(64, 64, Rgb32f(1, 2, 3));
+  ASSERT_TRUE(write_exr(path, image.view()));
+  const std::string whole = read_text(path).value();
+  ASSERT_TRUE(write_text(path, whole.substr(0, whole.size() / 2)));
+  EXPECT_EQ(read_exr(path).error().code, Errc::kBadFormat);
+}
+
+TEST(Jpeg, RefusesWhatIsNoJpeg) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_text(folder.path() / "a.jpg", "no picture"));
+  EXPECT_EQ(read_jpeg(folder.path() / "a.jpg").error().code, Errc::kBadFormat);
+  EXPECT_EQ(read_jpeg(folder.path() / "b.jpg").error().code, Errc::kNotFound);
+}
+
+TEST(Jpeg, ReadsARealPhotographAndRefusesHalfOfIt) {
+  const char* data = std::getenv("VENEER_DATA");
+  const fs::path photographs = fs::path(data == nullptr ? "" : data) / "rti_loewenkopf" / "jpg";
+  if (!fs::is_directory(photographs)) GTEST_SKIP() << "real data absent: " << photographs;
+  const fs::path photograph = fs::directory_iterator(photographs)->path();
+  const Image<Rgb8> image = read_jpeg(photograph).value();
+  EXPECT_EQ(image.width(), 64);
+  EXPECT_EQ(image.height(), 43);
+  const TemporaryFolder folder;
+  const std::string whole = read_text(photograph).value();
+  ASSERT_TRUE(write_text(folder.path() / "half.jpg", whole.substr(0, whole.size() / 2)));
+  EXPECT_EQ(read_jpeg(folder.path() / "half.jpg").error().code, Errc::kBadFormat);
+}
+
+}  // namespace
+}  // namespace veneer

@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
+
+// jpeglib.h uses FILE and size_t without including what declares them.
+// clang-format off
+#include <cstdio>
+
 #include <jpeglib.h>
+// clang-format on
 
 #include <csetjmp>
-#include <cstdio>  // jpeglib.h needs FILE declared before it
 #include <memory>
 
 #include "base/image_files.h"

@@ -1,2 +1,85 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "base/mesh.h"
+
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
+
+#include "base/files.h"
+#include "base/testing/temporary_folder.h"
+
+namespace veneer {
+namespace {
+
+using Eigen::Vector3d;
+
+class BuiltInMesh : public testing::TestWithParam<const char*> {
+ protected:
+  Mesh mesh_ = load_mesh(GetParam()).value();
+};
+INSTANTIATE_TEST_SUITE_P(All,
+                         BuiltInMesh,
+                         testing::Values("plate", "sphere", "vase"),
+                         [](const auto& built_in) { return std::string(built_in.param); });
+
+TEST_P(BuiltInMesh, HasAnticlockwiseTrianglesAlongItsNormals) {
+  for (const auto& [a, b, c] : mesh_.triangles) {
+    const Vector3d face = (mesh_.positions[b] - mesh_.positions[a])
+                              .cross(mesh_.positions[c] - mesh_.positions[a])
+                              .normalized();
+    EXPECT_GT(face.dot(mesh_.normals[a]), 0.9) << a << " " << b << " " << c;
+  }
+}
+
+TEST_P(BuiltInMesh, IsNotMirroredAndRunsAlongXInFront) {
+  // Along u the front runs towards +x, along v downwards.
+  for (const auto& [a, b, c] : mesh_.triangles) {
+    if (mesh_.normals[a].z() < 0.7) continue;
+    const Eigen::Vector2d e1 = mesh_.texture_coordinates[b] - mesh_.texture_coordinates[a];
+    const Eigen::Vector2d e2 = mesh_.texture_coordinates[c] - mesh_.texture_coordinates[a];
+    const double area = e1.x() * e2.y() - e1.y() * e2.x();
+    ASSERT_NE(area, 0);
+    const Vector3d p1 = mesh_.positions[b] - mesh_.positions[a];
+    const Vector3d p2 = mesh_.positions[c] - mesh_.positions[a];
+    EXPECT_GT(((p1 * e2.y() - p2 * e1.y()) / area).x(), 0) << "along u";
+    EXPECT_LT(((p2 * e1.x() - p1 * e2.x()) / area).y(), 0) << "along v";
+  }
+}
+
+TEST_P(BuiltInMesh, HasUnitNormalsThatFitItsFaces) {
+  for (const Vector3d& normal : mesh_.normals) EXPECT_NEAR(normal.norm(), 1, 1e-12);
+}
+
+TEST(LoadMesh, ReadsAnObjFileAndCountsVFromTheFirstRow) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "t.obj";
+  ASSERT_TRUE(write_text(
+      path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/2/1 3/3/1\n"));
+  const Mesh mesh = load_mesh(path).value();
+  ASSERT_EQ(mesh.triangles.size(), 1U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(mesh.texture_coordinates[i].y(), 1 - mesh.positions[i].y(), 1e-6);
+  }
+}
+
+TEST(LoadMesh, SaysHowToAddTextureCoordinates) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "bare.obj";
+  ASSERT_TRUE(write_text(path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
+  const auto mesh = load_mesh(path);
+  ASSERT_FALSE(mesh);
+  EXPECT_EQ(mesh.error().code, Errc::kBadFormat);
+  EXPECT_NE(mesh.error().what.find("no texture coordinates"), std::string::npos)
+      << mesh.error().what;
+}
+
+TEST(LoadMesh, RefusesMissingEmptyAndForeignFiles) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(load_mesh("no-such-mesh.obj").error().code, Errc::kNotFound);
+  ASSERT_TRUE(write_text(folder.path() / "empty.obj", ""));
+  EXPECT_EQ(load_mesh(folder.path() / "empty.obj").error().code, Errc::kBadFormat);
+  ASSERT_TRUE(write_text(folder.path() / "text.xyz", "hello"));
+  EXPECT_EQ(load_mesh(folder.path() / "text.xyz").error().code, Errc::kBadFormat);
+}
+
+}  // namespace
+}  // namespace veneer

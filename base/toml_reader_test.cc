@@ -1,2 +1,105 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "base/toml_reader.h"
+
 #include <gtest/gtest.h>
+
+namespace veneer {
+namespace {
+
+TEST(TomlReader, ReadsWhatIsThereAndLeavesDefaults) {
+  TomlReader toml =
+      TomlReader::parse("rate_hz = 60\nname = \"x\"\nup = [0, 1, 0]\n[light]\nlux = 2.5\n", "t")
+          .value();
+  double rate_hz = 1;
+  int frames = 120;
+  std::string name;
+  Eigen::Vector3d up;
+  toml.require("rate_hz", rate_hz);
+  toml.read("frames", frames);
+  toml.read("name", name);
+  toml.read("up", up);
+  double lux = 0;
+  toml.table("light").require("lux", lux);
+  ASSERT_TRUE(toml.finish()) << toml.finish().error().what;
+  EXPECT_EQ(rate_hz, 60);
+  EXPECT_EQ(frames, 120);
+  EXPECT_EQ(name, "x");
+  EXPECT_EQ(up, Eigen::Vector3d::UnitY());
+  EXPECT_EQ(lux, 2.5);
+}
+
+TEST(TomlReader, NamesUnknownKeysWithLineAndNearestOne) {
+  TomlReader toml =
+      TomlReader::parse("frames = 1\n[light]\nilluminance = 3\n", "demo.toml").value();
+  int frames = 0;
+  double lux = 0;
+  toml.read("frames", frames);
+  TomlReader light = toml.table("light");
+  light.read("illuminance_lux", lux);
+  light.read("direction", lux);
+  const Status status = toml.finish();
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, Errc::kInvalidOption);
+  EXPECT_EQ(status.error().what,
+            "demo.toml:3: light.illuminance: unknown key; did you mean \"illuminance_lux\"?");
+}
+
+TEST(TomlReader, CollectsEveryMistake) {
+  TomlReader toml =
+      TomlReader::parse("a = \"text\"\nb = [1, 2]\nc = -1\nd = inf\ne = 1.5\n", "t").value();
+  double a = 7;
+  Eigen::Vector3d b(1, 2, 3);
+  std::uint64_t c = 9;
+  double d = 8;
+  int e = 3;
+  double missing = 0;
+  toml.read("a", a);
+  toml.read("b", b);
+  toml.read("c", c);
+  toml.read("d", d);
+  toml.read("e", e);
+  toml.require("missing", missing);
+  const std::string what = toml.finish().error().what;
+  for (const char* part :
+       {"t:1: a:", "t:2: b:", "t:3: c:", "t:4: d:", "t:5: e:", "missing: this key is missing"}) {
+    EXPECT_NE(what.find(part), std::string::npos) << part << " in\n" << what;
+  }
+  EXPECT_EQ(a, 7) << "a wrong value must not get through";
+  EXPECT_EQ(b, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(e, 3);
+}
+
+TEST(TomlReader, ReadsArraysOfTables) {
+  TomlReader toml =
+      TomlReader::parse("[[light]]\nlux = 1\n[[light]]\nlux = 2\nwrong = 1\n", "t").value();
+  double sum = 0;
+  for (TomlReader& light : toml.tables("light")) {
+    double lux = 0;
+    light.require("lux", lux);
+    sum += lux;
+  }
+  EXPECT_EQ(sum, 3);
+  EXPECT_NE(toml.finish().error().what.find("light[1].wrong"), std::string::npos);
+  EXPECT_TRUE(toml.tables("nobody").empty());
+}
+
+TEST(TomlReader, NamesTheLineOfASyntaxError) {
+  const auto toml = TomlReader::parse("a = 1\nb = \n", "t.toml");
+  ASSERT_FALSE(toml);
+  EXPECT_EQ(toml.error().code, Errc::kInvalidOption);
+  EXPECT_NE(toml.error().what.find("t.toml:2"), std::string::npos) << toml.error().what;
+}
+
+TEST(TomlReader, TellsAMissingFileFromABadOne) {
+  EXPECT_EQ(TomlReader::open("no-such.toml").error().code, Errc::kNotFound);
+}
+
+TEST(TomlReader, TakesAScalarWhereATableShouldBeAsAMistake) {
+  TomlReader toml = TomlReader::parse("light = 3\n", "t").value();
+  double lux = 0;
+  toml.table("light").read("lux", lux);
+  EXPECT_FALSE(toml.finish());
+}
+
+}  // namespace
+}  // namespace veneer

@@ -12,6 +12,47 @@ if(CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   target_compile_options(veneer_options INTERFACE -march=x86-64-v3)
 endif()
 
+# Every test program, so that a sanitizer build can ask for these alone.
+add_custom_target(veneer_tests)
+
+# veneer_add_test(NAME SRCS ... [DEPS ...])
+#
+# Makes the GoogleTest program veneer_NAME_test and the ctest NAME; its results go to
+# test-results/NAME.xml, where ./dev test counts the cases. A test that draws is labelled gl.
+function(veneer_add_test name)
+  cmake_parse_arguments(T "" "" "SRCS;DEPS" ${ARGN})
+  add_executable(veneer_${name}_test ${T_SRCS})
+  target_link_libraries(veneer_${name}_test PRIVATE ${T_DEPS} GTest::gtest GTest::gmock
+                                                    GTest::gtest_main)
+  add_dependencies(veneer_tests veneer_${name}_test)
+  add_test(NAME ${name} COMMAND veneer_${name}_test)
+  # Real measured data; tests that need it skip, saying so, where it is absent.
+  set(data ${CMAKE_SOURCE_DIR}/../shared/data)
+  if(DEFINED ENV{VENEER_DATA})
+    set(data $ENV{VENEER_DATA})
+  endif()
+  set_property(TEST ${name} PROPERTY ENVIRONMENT
+    "VENEER_DATA=${data}" "GTEST_OUTPUT=xml:${CMAKE_BINARY_DIR}/test-results/${name}.xml")
+  veneer_uses_gl(gl ${T_DEPS})
+  if(gl)
+    set_property(TEST ${name} PROPERTY LABELS gl)
+  endif()
+endfunction()
+
+# veneer_uses_gl(RESULT DEPS...): whether one of DEPS is GL itself or a module that uses it.
+function(veneer_uses_gl result)
+  set(${result} FALSE PARENT_SCOPE)
+  foreach(dep IN LISTS ARGN)
+    set(dep_uses_gl FALSE)
+    if(TARGET ${dep})
+      get_target_property(dep_uses_gl ${dep} VENEER_GL)
+    endif()
+    if(dep_uses_gl OR dep STREQUAL "PkgConfig::EPOXY")
+      set(${result} TRUE PARENT_SCOPE)
+    endif()
+  endforeach()
+endfunction()
+
 # veneer_add_module(NAME LAYER n SRCS ... [TESTS ...] [DEPS ...] [PRIVATE_DEPS ...] [TEST_DEPS ...])
 #
 # Makes the library veneer::NAME of floor n from SRCS and the test program veneer_NAME_test from
@@ -25,25 +66,23 @@ function(veneer_add_module name)
   endif()
   add_library(veneer_${name} STATIC ${M_SRCS})
   add_library(veneer::${name} ALIAS veneer_${name})
-  set_property(TARGET veneer_${name} PROPERTY VENEER_LAYER ${M_LAYER})
   target_link_libraries(veneer_${name} PUBLIC veneer_options ${M_DEPS} PRIVATE ${M_PRIVATE_DEPS})
   foreach(dep IN LISTS M_DEPS M_PRIVATE_DEPS)
-    if(NOT TARGET ${dep})
-      continue()
+    # The floors are added lowest first, so what is not there yet is above (or misspelt).
+    if(dep MATCHES "^veneer::" AND NOT TARGET ${dep})
+      message(FATAL_ERROR "veneer_${name} (floor ${M_LAYER}) may not use ${dep}: no lower floor has it")
     endif()
-    get_target_property(dep_layer ${dep} VENEER_LAYER)
-    if(dep_layer AND NOT dep_layer LESS M_LAYER)
-      message(FATAL_ERROR "veneer_${name} (floor ${M_LAYER}) may not use ${dep} (floor ${dep_layer})")
+    if(TARGET ${dep})
+      get_target_property(dep_layer ${dep} VENEER_LAYER)
+      if(dep_layer AND NOT dep_layer LESS M_LAYER)
+        message(FATAL_ERROR "veneer_${name} (floor ${M_LAYER}) may not use ${dep} (floor ${dep_layer})")
+      endif()
     endif()
   endforeach()
+  veneer_uses_gl(gl ${M_DEPS} ${M_PRIVATE_DEPS})
+  set_target_properties(veneer_${name} PROPERTIES VENEER_LAYER ${M_LAYER} VENEER_GL ${gl})
   if(VENEER_TESTS AND M_TESTS)
-    add_executable(veneer_${name}_test ${M_TESTS})
-    target_link_libraries(veneer_${name}_test PRIVATE veneer_${name} ${M_TEST_DEPS} GTest::gtest
-                                                      GTest::gmock GTest::gtest_main)
-    add_test(NAME ${name} COMMAND veneer_${name}_test)
-    # Real measured data; tests that need it skip, saying so, where it is absent.
-    set_property(TEST ${name} PROPERTY ENVIRONMENT_MODIFICATION
-      "VENEER_DATA=set:$<IF:$<BOOL:$ENV{VENEER_DATA}>,$ENV{VENEER_DATA},${CMAKE_SOURCE_DIR}/../shared/data>")
+    veneer_add_test(${name} SRCS ${M_TESTS} DEPS veneer::${name} ${M_TEST_DEPS})
   endif()
 endfunction()
 
