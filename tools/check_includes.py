@@ -66,7 +66,7 @@ class Checker:
         self.texts = {}
         self.files = set(tree(root))
         for path in sorted(self.files):
-            if path.endswith("CMakeLists.txt") and "/" in path:
+            if path.endswith("/CMakeLists.txt") and not self._is_above_all_floors(path):
                 self._read_floor(path)
             elif path.endswith((".cc", ".h")):
                 text = (root / path).read_text(encoding="utf-8")
