@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "btf/sample_set.h"
+
+// What reading and writing a sample set have in common.
+namespace veneer::btf::internal {
+
+inline constexpr const char* kTomlName = "set.toml";
+inline constexpr const char* kViewsName = "views.csv";
+inline constexpr const char* kLightsName = "lights.csv";
+inline constexpr const char* kSamplesName = "samples.safetensors";
+inline constexpr const char* kTensorName = "samples";
+
+[[nodiscard]] const std::vector<std::string>& channel_names(bool polarised);
+/// The shape of the tensor: [texel][view][light][channel].
+[[nodiscard]] std::vector<std::int64_t> sample_shape(const SampleSetInfo& info);
+/// Refuses, with `code`, sizes out of range and directions that are none, equal, not of unit length
+/// or below the horizon.
+[[nodiscard]] Status check_info(const SampleSetInfo& info, Errc code, std::string_view doing);
+
+}  // namespace veneer::btf::internal

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+
+#include "base/random.h"
+#include "base/testing/temporary_folder.h"
+#include "btf/sample_set.h"
+
+// Small things that several tests of this module need.
+namespace veneer::btf::testing {
+
+/// Uniform over the sphere, z from `lowest_z` upwards.
+inline Direction random_direction(Pcg32& random, double lowest_z = 0.0) {
+  const double z = lowest_z + (1.0 - lowest_z) * random.uniform();
+  const double phi = 2.0 * std::numbers::pi * random.uniform();
+  const double radius = std::sqrt(std::max(0.0, 1.0 - z * z));
+  return {radius * std::cos(phi), radius * std::sin(phi), z};
+}
+
+/// The value of a channel of a sample: sample(texel, view, light, channel).
+using SampleFunction = std::function<float(int, int, int, int)>;
+
+/// Writes a set whose samples are given by a function, and opens it.
+inline SampleSet make_set(const std::filesystem::path& folder,
+                          const SampleSetInfo& info,
+                          const SampleFunction& sample) {
+  auto writer = SampleSetWriter::create(folder, info);
+  if (!writer) throw std::runtime_error(writer.error().what);
+  for (int texel = 0; texel < info.texel_count(); ++texel) {
+    std::size_t i = 0;
+    const std::span<Eigen::half> out = writer->texel(texel);
+    for (int view = 0; view < static_cast<int>(info.views.size()); ++view)
+      for (int light = 0; light < static_cast<int>(info.lights.size()); ++light)
+        for (int channel = 0; channel < info.channel_count(); ++channel)
+          out[i++] = Eigen::half(sample(texel, view, light, channel));
+  }
+  if (auto status = writer->finish(); !status) throw std::runtime_error(status.error().what);
+  auto set = SampleSet::open(folder);
+  if (!set) throw std::runtime_error(set.error().what);
+  return *set;
+}
+
+}  // namespace veneer::btf::testing

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <utility>
+
+#include "base/files.h"
+#include "btf/internal_sample_set.h"
+
+namespace veneer::btf {
+namespace {
+
+// A TOML basic string.
+std::string toml_string(std::string_view text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      result += '\\';
+      result += c;
+    } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
+      result += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
+    } else {
+      result += c;
+    }
+  }
+  return result + '"';
+}
+
+std::string set_toml(const SampleSetInfo& info) {
+  std::vector<std::string> channels;
+  for (const std::string& name : internal::channel_names(info.polarised))
+    channels.push_back(toml_string(name));
+  std::string text =
+      "# A sample is pi * f_r * cos(theta_l): a white Lambertian texel lit along its normal is "
+      "1.\n";
+  text += "layout = \"product\"\n";
+  text += fmt::format("width = {}\nheight = {}\n", info.width, info.height);
+  text += fmt::format("texel_pitch_mm = {:#}\n", info.texel_pitch_mm);
+  text += fmt::format("channels = [{}]\n", fmt::join(channels, ", "));
+  text += "scale = 1.0\ncosine = \"included\"\n";
+  text += fmt::format(
+      "source = {}\nlicence = {}\n", toml_string(info.source), toml_string(info.licence));
+  return text;
+}
+
+}  // namespace
+
+struct SampleSetWriter::State {
+  State(SampleSetInfo set_info, StagedFolder staged_folder, SafetensorsWriter writer)
+      : info(std::move(set_info)), folder(std::move(staged_folder)), samples(std::move(writer)) {}
+  SampleSetInfo info;
+  StagedFolder folder;
+  SafetensorsWriter samples;  // lies in the folder, so it goes first
+  std::span<Eigen::half> values;
+};
+
+SampleSetWriter::SampleSetWriter(std::unique_ptr<State> state) : state_(std::move(state)) {}
+SampleSetWriter::SampleSetWriter(SampleSetWriter&&) noexcept = default;
+SampleSetWriter::~SampleSetWriter() = default;
+
+Result<SampleSetWriter> SampleSetWriter::create(const std::filesystem::path& folder,
+                                                const SampleSetInfo& info) {
+  VENEER_TRY(internal::check_info(
+      info, Errc::kInvalidOption, fmt::format("writing sample set {}", folder.string())));
+  VENEER_ASSIGN(StagedFolder staged, StagedFolder::create(folder));
+  VENEER_ASSIGN(SafetensorsWriter samples,
+                SafetensorsWriter::create(
+                    staged.path() / internal::kSamplesName,
+                    {TensorSpec{internal::kTensorName, DType::kF16, internal::sample_shape(info)}},
+                    {{"format", "veneer-sample-set"}}));
+  auto state = std::make_unique<State>(info, std::move(staged), std::move(samples));
+  state->values = state->samples.tensor<Eigen::half>(internal::kTensorName);
+  return SampleSetWriter(std::move(state));
+}
+
+std::span<Eigen::half> SampleSetWriter::texel(int texel) {
+  const SampleSetInfo& info = state_->info;
+  VENEER_CHECK(texel >= 0 && texel < info.texel_count());
+  const auto size =
+      static_cast<std::size_t>(info.pair_count()) * static_cast<std::size_t>(info.channel_count());
+  return state_->values.subspan(static_cast<std::size_t>(texel) * size, size);
+}
+
+Status SampleSetWriter::finish() {
+  const std::filesystem::path& folder = state_->folder.path();
+  VENEER_TRY(write_text(folder / internal::kTomlName, set_toml(state_->info)));
+  VENEER_TRY(write_directions(folder / internal::kViewsName, state_->info.views));
+  VENEER_TRY(write_directions(folder / internal::kLightsName, state_->info.lights));
+  VENEER_TRY(state_->samples.finish());
+  return state_->folder.commit();
+}
+
+}  // namespace veneer::btf
