@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/materials/synthesize.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <vector>
+
+#include "base/parallel.h"
+#include "btf/sample_set.h"
+#include "simulation/materials/internal_materials.h"
+#include "simulation/materials/tracer.h"
+
+namespace veneer::simulation {
+
+namespace {
+
+constexpr std::array kMaterials{
+    HeightFieldMaterial{"cloth", "twill of two thread colours with a satin gloss", &make_cloth},
+    HeightFieldMaterial{
+        "corrugated", "corrugated sheet with gloss (Obara et al. 2006)", &make_corrugated},
+    HeightFieldMaterial{
+        "hammered", "hammered copper: tinted gloss, hardly any body colour", &make_hammered},
+    HeightFieldMaterial{"leather", "pressed brown leather under a clear coat", &make_leather},
+};
+static_assert(std::ranges::is_sorted(kMaterials, {}, &HeightFieldMaterial::name));
+
+// Brighter than any half can hold would be infinite; a mirror-like glint is cut there.
+constexpr float kMaxHalf = 65504.0F;
+
+}  // namespace
+
+std::span<const HeightFieldMaterial> height_field_materials() { return kMaterials; }
+
+Result<const HeightFieldMaterial*> find_height_field_material(std::string_view name) {
+  const auto* const found = std::ranges::find(kMaterials, name, &HeightFieldMaterial::name);
+  if (found != kMaterials.end()) return found;
+  std::string names;
+  for (const auto& material : kMaterials) {
+    names += names.empty() ? "" : ", ";
+    names += material.name;
+  }
+  return fail(
+      Errc::kInvalidOption, "looking for a material: there is no '{}'; there are {}", name, names);
+}
+
+Status synthesize(const HeightFieldMaterial& material,
+                  const std::filesystem::path& out,
+                  const SynthesisOptions& options,
+                  Progress& progress) {
+  VENEER_TRY(options.check());
+  const HeightField field = material.make(options.size, options.seed);
+  VENEER_TRY(field.check());
+
+  btf::SampleSetInfo info;
+  info.width = options.size;
+  info.height = options.size;
+  info.texel_pitch_mm = field.tile_width_mm / options.size;
+  info.polarised = true;
+  info.views = options.views;
+  info.lights = options.lights;
+  info.source = fmt::format("veneer synthesize {}: size {}, samples {}, bounces {}, seed {}",
+                            material.name,
+                            options.size,
+                            options.samples,
+                            options.bounces,
+                            options.seed);
+  info.licence = "computed from formulas; free of rights";
+  VENEER_ASSIGN(btf::SampleSetWriter writer, btf::SampleSetWriter::create(out, info));
+
+  const Tracer tracer(field, options, progress);
+  progress.start(fmt::format("tracing {}", material.name), options.size);
+  parallel_for(options.size, 1, [&](std::int64_t begin, std::int64_t end) {
+    std::vector<float> samples(static_cast<std::size_t>(info.pair_count() * info.channel_count()));
+    for (auto row = static_cast<int>(begin); row < end; ++row) {
+      for (int column = 0; column < options.size; ++column) {
+        const int texel = row * options.size + column;
+        tracer.trace(texel, samples);
+        std::ranges::transform(samples, writer.texel(texel).begin(), [](float sample) {
+          return Eigen::half(std::min(sample, kMaxHalf));
+        });
+      }
+      progress.advance();
+    }
+  });
+  progress.finish();
+  return writer.finish();
+}
+
+}  // namespace veneer::simulation
