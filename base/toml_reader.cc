@@ -58,10 +58,40 @@ struct TomlReader::Document {
 TomlReader::TomlReader(std::shared_ptr<Document> document, std::shared_ptr<Node> node)
     : document_(std::move(document)), node_(std::move(node)) {}
 
-Result<TomlReader> TomlReader::open(const std::filesystem::path& path) {
+namespace {
+
+/// Puts every value of `changes` in the place of the one in `table`, table by table.
+void merge(toml::table& table, toml::table&& changes) {
+  for (auto&& [key, value] : changes) {
+    toml::table* below = table.get_as<toml::table>(key.str()) != nullptr && value.is_table()
+                             ? table.get_as<toml::table>(key.str())
+                             : nullptr;
+    if (below != nullptr) {
+      merge(*below, std::move(*value.as_table()));
+    } else {
+      table.insert_or_assign(key.str(), std::move(value));
+    }
+  }
+}
+
+}  // namespace
+
+Result<TomlReader> TomlReader::open(const std::filesystem::path& path,
+                                    const std::vector<std::string>& overrides) {
   VENEER_ASSIGN(const std::string text, read_text(path));
   VENEER_ASSIGN(TomlReader reader, parse(text, path.string()));
   reader.document_->folder = path.parent_path();
+  for (const std::string& line : overrides) {
+    toml::parse_result parsed = toml::parse(line);
+    if (!parsed) {
+      return fail(
+          Errc::kInvalidOption,
+          "reading the setting '{}': {}; write it as in the file, such as render.dither=false",
+          line,
+          std::string(parsed.error().description()));
+    }
+    merge(reader.document_->root, std::move(parsed).table());
+  }
   return reader;
 }
 

@@ -27,7 +27,10 @@ namespace veneer {
 ///     VENEER_TRY(toml.finish());
 class TomlReader {
  public:
-  [[nodiscard]] static Result<TomlReader> open(const std::filesystem::path& path);
+  /// @param overrides  "key = value" lines in TOML's own syntax ("render.dither = false") that
+  ///                   replace what the file says.
+  [[nodiscard]] static Result<TomlReader> open(const std::filesystem::path& path,
+                                               const std::vector<std::string>& overrides = {});
   /// @param origin  what error messages call the text.
   [[nodiscard]] static Result<TomlReader> parse(std::string_view text, std::string_view origin);
 

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include "base/files.h"
+#include "base/testing/temporary_folder.h"
+
 namespace veneer {
 namespace {
 
@@ -81,6 +84,31 @@ TEST(TomlReader, ReadsArraysOfTables) {
   EXPECT_EQ(sum, 3);
   EXPECT_NE(toml.finish().error().what.find("light[1].wrong"), std::string::npos);
   EXPECT_TRUE(toml.tables("nobody").empty());
+}
+
+TEST(TomlReader, LetsSettingsReplaceWhatTheFileSays) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "t.toml";
+  ASSERT_TRUE(write_text(path, "frames = 1\n[render]\ndither = true\ncompensate = true\n"));
+  TomlReader toml =
+      TomlReader::open(path, {"render.dither = false", "frames=7", "new.x = 2.5"}).value();
+  int frames = 0;
+  bool dither = true;
+  bool compensate = false;
+  double x = 0;
+  toml.read("frames", frames);
+  TomlReader render = toml.table("render");
+  render.read("dither", dither);
+  render.read("compensate", compensate);
+  toml.table("new").read("x", x);
+  ASSERT_TRUE(toml.finish());
+  EXPECT_EQ(frames, 7);
+  EXPECT_FALSE(dither);
+  EXPECT_TRUE(compensate);
+  EXPECT_EQ(x, 2.5);
+  const auto bad = TomlReader::open(path, {"render dither"});
+  ASSERT_FALSE(bad);
+  EXPECT_NE(bad.error().what.find("render dither"), std::string::npos);
 }
 
 TEST(TomlReader, NamesTheLineOfASyntaxError) {
