@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tracking/drivers.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include "tracking/drivers/replay/replay_tracker.h"
+#include "tracking/drivers/simulated/simulated_tracker.h"
+
+namespace veneer::tracking {
+namespace {
+
+template <class T>
+Result<std::unique_ptr<Tracker>> open_as_tracker(TomlReader& config, Clock& clock) {
+  return T::open(config, clock);
+}
+
+constexpr std::array kDrivers{
+    Driver{"replay", "a recording, at its own pace", &open_as_tracker<ReplayTracker>},
+    Driver{"simulated", "bodies on scripted paths", &open_as_tracker<SimulatedTracker>},
+};
+static_assert(std::ranges::is_sorted(kDrivers, {}, &Driver::name));
+
+}  // namespace
+
+std::span<const Driver> drivers() { return kDrivers; }
+
+Result<std::unique_ptr<Tracker>> open_tracker(TomlReader& config, Clock& clock) {
+  std::string name;
+  config.read("driver", name);
+  const auto driver = std::ranges::find(kDrivers, name, &Driver::name);
+  if (driver != kDrivers.end()) return driver->open(config, clock);
+  std::string known;
+  for (const Driver& each : kDrivers) known += fmt::format(" \"{}\"", each.name);
+  return fail(Errc::kInvalidOption,
+              "opening the tracker: no driver is called \"{}\"; set driver to one of{}",
+              name,
+              known);
+}
+
+}  // namespace veneer::tracking

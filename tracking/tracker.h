@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <string>
+
+#include "base/result.h"
+#include "tracking/pose.h"
+
+namespace veneer::tracking {
+
+/// The tracker HAL: a source of pose samples. One thread uses it at a time.
+class Tracker {
+ public:
+  virtual ~Tracker() = default;
+  /// For logs: driver and device.
+  [[nodiscard]] virtual std::string description() const = 0;
+  /// The next sample, in the order of arrival. Blocks for at most `timeout` on the tracker's clock.
+  /// Errors: kTimeout (try again), kDisconnected (final; open again).
+  [[nodiscard]] virtual Result<PoseSample> wait_pose(Duration timeout) = 0;
+};
+
+}  // namespace veneer::tracking
