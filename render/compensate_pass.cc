@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/compensate_pass.h"
+
+#include <bit>
+#include <vector>
+
+namespace veneer::render {
+namespace {
+
+constexpr char kFullscreenVert[] =
+#include "render/shaders/fullscreen.vert.inc"
+    ;
+constexpr char kCompensateFrag[] =
+#include "render/shaders/compensate.frag.inc"
+    ;
+constexpr char kCountComp[] =
+#include "render/shaders/count.comp.inc"
+    ;
+constexpr std::string_view kVersion = "#version 450 core\n";
+// Pixels that one work group of count.comp takes: 8 x 8 invocations with tiles of 16 x 8.
+constexpr int kGroupWidth = 128;
+constexpr int kGroupHeight = 64;
+constexpr std::size_t kCounterCount = 5;  // of the block Counters
+constexpr double kLossUnit = 1.0 / 64.0;  // of the loss in the codes' alpha
+
+// The block Compensation of compensate.frag.
+struct ConstantsBlock {
+  Eigen::Matrix4f drive_from_target;
+  Eigen::Matrix4f cones_from_target;
+  Eigen::Matrix4f drive_from_cones;
+  Eigen::Matrix4f cones_from_drive;
+  Eigen::Vector4f drive_of_ambient;
+  Eigen::Vector4f drive_of_black;
+  Eigen::Vector4f drive_of_white;
+  Eigen::Vector4i first_level;
+  Eigen::Vector4i level_count;
+  float geometry_floor;
+  float gamut_tolerance;
+  float dither;
+  float padding;
+};
+static_assert(sizeof(ConstantsBlock) == 4 * 64 + 6 * 16);
+
+Eigen::Matrix4f padded(const Eigen::Matrix3d& m) {
+  Eigen::Matrix4f result = Eigen::Matrix4f::Identity();
+  result.topLeftCorner<3, 3>() = m.cast<float>();
+  return result;
+}
+Eigen::Vector4f padded(const Eigen::Vector3d& v) {
+  return Eigen::Vector4d(v.x(), v.y(), v.z(), 0).cast<float>();
+}
+
+ConstantsBlock block_of(const Compensation& compensation) {
+  const Compensation::Constants& c = compensation.constants();
+  ConstantsBlock block{};
+  block.drive_from_target = padded(c.drive_from_target);
+  block.cones_from_target = padded(c.cones_from_target);
+  block.drive_from_cones = padded(c.drive_from_cones);
+  block.cones_from_drive = padded(c.cones_from_drive);
+  block.drive_of_ambient = padded(c.drive_of_ambient);
+  block.drive_of_black = padded(c.drive_of_black);
+  block.drive_of_white = padded(c.drive_of_white);
+  int first = 0;
+  for (int i = 0; i < 3; ++i) {
+    const auto count =
+        static_cast<int>(compensation.tone_levels()[static_cast<std::size_t>(i)].levels().size());
+    block.first_level[i] = first;
+    block.level_count[i] = count;
+    first += count;
+  }
+  block.geometry_floor = static_cast<float>(c.geometry_floor);
+  block.gamut_tolerance = static_cast<float>(kGamutTolerance);
+  block.dither = c.dither ? 1.0F : 0.0F;
+  return block;
+}
+
+// The block Tones: all seeds, then all levels, channel by channel.
+GlBuffer upload_tones(const Compensation& compensation) {
+  std::vector<std::uint32_t> words;
+  for (const ToneLevels& tone : compensation.tone_levels()) {
+    for (const auto& seed : tone.seeds())
+      words.push_back(seed[0] | static_cast<std::uint32_t>(seed[1]) << 16U);
+  }
+  for (const ToneLevels& tone : compensation.tone_levels()) {
+    for (std::size_t i = 0; i < tone.levels().size(); ++i) {
+      words.push_back(std::bit_cast<std::uint32_t>(tone.levels()[i]));
+      words.push_back(std::bit_cast<std::uint32_t>(static_cast<float>(tone.codes()[i])));
+    }
+  }
+  return make_buffer(words.data(), words.size() * sizeof(std::uint32_t), 0);
+}
+
+GLsizei groups(int pixels, int per_group) { return (pixels + per_group - 1) / per_group; }
+
+}  // namespace
+
+std::string compensate_fragment_source(bool compensate) {
+  return fmt::format("{}#define SEED_COUNT {}\n#define GAMUT_STEPS {}\n{}{}",
+                     kVersion,
+                     ToneLevels::kSeeds,
+                     kGamutSteps,
+                     compensate ? "#define COMPENSATE\n" : "",
+                     kCompensateFrag);
+}
+std::string fullscreen_vertex_source() { return std::string(kVersion) + kFullscreenVert; }
+std::string count_compute_source() { return std::string(kVersion) + kCountComp; }
+
+Result<CompensatePass> CompensatePass::create(const Compensation& compensation,
+                                              ImageView<const float> vignetting) {
+  CompensatePass pass;
+  pass.width_ = vignetting.width();
+  pass.height_ = vignetting.height();
+  VENEER_ASSIGN(pass.program_,
+                link_program({{GL_VERTEX_SHADER, "fullscreen.vert", fullscreen_vertex_source()},
+                              {GL_FRAGMENT_SHADER,
+                               "compensate.frag",
+                               compensate_fragment_source(compensation.constants().compensate)}}));
+  VENEER_ASSIGN(pass.count_program_,
+                link_program({{GL_COMPUTE_SHADER, "count.comp", count_compute_source()}}));
+  pass.seed_location_ = glGetUniformLocation(pass.program_.id(), "dither_seed");
+
+  const ConstantsBlock block = block_of(compensation);
+  pass.constants_ = make_buffer(&block, sizeof(block), 0);
+  pass.tones_ = upload_tones(compensation);
+  pass.vignetting_ = make_texture_2d(GL_R32F, pass.width_, pass.height_);
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, static_cast<GLint>(vignetting.stride()));
+  glTextureSubImage2D(pass.vignetting_.id(),
+                      0,
+                      0,
+                      0,
+                      pass.width_,
+                      pass.height_,
+                      GL_RED,
+                      GL_FLOAT,
+                      vignetting.data());
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
+  pass.codes_ = make_texture_2d(GL_RGBA16UI, pass.width_, pass.height_);
+  pass.framebuffer_ = make_framebuffer();
+  glNamedFramebufferTexture(pass.framebuffer_.id(), GL_COLOR_ATTACHMENT0, pass.codes_.id(), 0);
+  pass.no_vertices_ = make_vertex_array();
+
+  GLint alignment = 1;
+  glGetIntegerv(GL_SHADER_STORAGE_BUFFER_OFFSET_ALIGNMENT, &alignment);
+  const GLintptr needed = kCounterCount * sizeof(std::uint32_t);
+  pass.slot_bytes_ = (needed + alignment - 1) / alignment * alignment;
+  const GLbitfield mapping = GL_MAP_READ_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
+  const auto bytes = static_cast<GLsizeiptr>(kRing) * pass.slot_bytes_;
+  pass.counters_ = make_buffer(nullptr, static_cast<std::size_t>(bytes), mapping);
+  const auto* mapped =
+      static_cast<const std::byte*>(glMapNamedBufferRange(pass.counters_.id(), 0, bytes, mapping));
+  if (mapped == nullptr)
+    return fail(Errc::kUnavailable,
+                "mapping the frame's counters: the driver refuses a persistent mapping");
+  for (std::size_t i = 0; i < kRing; ++i) {
+    pass.ring_[i].mapped = reinterpret_cast<const volatile std::uint32_t*>(
+        mapped + i * static_cast<std::size_t>(pass.slot_bytes_));
+  }
+  return pass;
+}
+
+CompensatePass::~CompensatePass() {
+  // Moved-from passes have no program, and their fences went along.
+  if (program_.id() == 0) return;
+  for (const InFlight& slot : ring_) glDeleteSync(slot.fence);  // null is ignored
+}
+
+void CompensatePass::run(GLuint target, std::uint32_t dither_seed) {
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
+  glViewport(0, 0, width_, height_);
+  glDisable(GL_DEPTH_TEST);
+  glDisable(GL_BLEND);
+  glUseProgram(program_.id());
+  glProgramUniform1ui(program_.id(), seed_location_, dither_seed);
+  glBindBufferBase(GL_UNIFORM_BUFFER, 1, constants_.id());
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, tones_.id());
+  glBindTextureUnit(0, target);
+  glBindTextureUnit(1, vignetting_.id());
+  glBindVertexArray(no_vertices_.id());
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+
+  const std::size_t index = frame_ % kRing;
+  InFlight& slot = ring_[index];
+  const GLintptr offset = static_cast<GLintptr>(index) * slot_bytes_;
+  const GLuint zero = 0;
+  glClearNamedBufferSubData(
+      counters_.id(), GL_R32UI, offset, slot_bytes_, GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
+  glUseProgram(count_program_.id());
+  glBindTextureUnit(0, codes_.id());
+  glBindBufferRange(GL_SHADER_STORAGE_BUFFER, 1, counters_.id(), offset, slot_bytes_);
+  glDispatchCompute(groups(width_, kGroupWidth), groups(height_, kGroupHeight), 1);
+  glMemoryBarrier(GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT);
+  // Whoever did not ask in time loses the counts of four frames ago.
+  glDeleteSync(slot.fence);
+  slot.fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+  slot.number = ++frame_;
+}
+
+const CompensatePass::Counts& CompensatePass::counts() {
+  for (InFlight& slot : ring_) {
+    if (slot.fence == nullptr) continue;
+    const GLenum state = glClientWaitSync(slot.fence, GL_SYNC_FLUSH_COMMANDS_BIT, 0);
+    if (state != GL_ALREADY_SIGNALED && state != GL_CONDITION_SATISFIED) continue;
+    glDeleteSync(slot.fence);
+    slot.fence = nullptr;
+    if (slot.number < newest_counted_) continue;
+    newest_counted_ = slot.number;
+    const std::uint64_t loss = slot.mapped[3] | static_cast<std::uint64_t>(slot.mapped[4]) << 32U;
+    counts_ = {
+        slot.mapped[0], slot.mapped[1], slot.mapped[2], static_cast<double>(loss) * kLossUnit};
+  }
+  return counts_;
+}
+
+}  // namespace veneer::render

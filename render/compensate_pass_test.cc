@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/compensate_pass.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "base/random.h"
+#include "render/egl_context.h"
+#include "render/internal_testing.h"
+
+namespace veneer::render {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::Vector4f;
+
+constexpr int kWidth = 200;
+constexpr int kHeight = 144;  // no multiples of count.comp's groups
+
+// Targets of every kind, with geometry in w: mostly reachable ones, many out of gamut, and all that
+// can go wrong.
+std::vector<Vector4f> targets(const calibration::ProjectorProfile& profile) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  constexpr float kInf = std::numeric_limits<float>::infinity();
+  constexpr float kOdd[] = {kNan, kInf, -kInf, 0.0F, -0.0F, -3.0F, 65504.0F, 1e-7F};
+  Pcg32 random(11);
+  std::vector<Vector4f> all;
+  for (int i = 0; i < kWidth * kHeight; ++i) {
+    const double g = 0.02 + 1.5 * random.uniform();
+    const double spread = i % 3 == 0 ? 4.0 : 1.0;
+    const double shift = i % 3 == 0 ? 1.0 : 0.0;
+    const Vector3d t(spread * random.uniform() - shift,
+                     spread * random.uniform() - shift,
+                     spread * random.uniform() - shift);
+    const Vector3d xyz =
+        profile.surface * (g * (profile.primaries * t + profile.black) + profile.ambient);
+    Vector4f texel;
+    texel << xyz.cast<float>(), static_cast<float>(g);
+    if (i % 17 == 0) texel[static_cast<int>(random.next() % 4)] = kOdd[random.next() % 8];
+    if (i % 23 == 0) texel[3] = 0;
+    all.push_back(texel);
+  }
+  return all;
+}
+
+class CompensatePassTest : public ::testing::TestWithParam<RendererOptions> {};
+
+// How far a drive computed in float may be off: the solution subtracts ambient light and black that
+// are up to 1/G_floor = 20 times as large as full drive, each with a few roundings of 2^-24.
+constexpr double kDriveTolerance = 2e-5;
+// The same for a mapped one: the pow() of GL is less exact (llvmpipe: about 1e-5 relative), and one
+// step of the bisection may go the other way.
+constexpr double kMappedTolerance = 2e-3;
+// Loss is stored in steps of 1/64, and pow() errs as above; absurd targets (a component of 65504)
+// are left out, for which it is large.
+constexpr double kLossTolerance = 0.1;
+
+TEST_P(CompensatePassTest, AgreesWithTheCpu) {
+  for (const int bits : {8, 10}) {
+    const auto profile = example_profile(kWidth, kHeight, bits);
+    auto context = EglContext::create();
+    if (!context) GTEST_SKIP() << context.error().what;
+    const Compensation cpu(profile, GetParam());
+    const Image<float> vignetting = vignetting_raster(profile);
+    auto pass = CompensatePass::create(cpu, vignetting.view());
+    ASSERT_TRUE(pass) << pass.error().what;
+
+    const std::vector<Vector4f> all = targets(profile);
+    const GlTexture texture = make_texture_2d(GL_RGBA32F, kWidth, kHeight);
+    glTextureSubImage2D(texture.id(), 0, 0, 0, kWidth, kHeight, GL_RGBA, GL_FLOAT, all.data());
+    constexpr std::uint32_t kSeed = 77;
+    pass->run(texture.id(), kSeed);
+    std::vector<std::array<std::uint16_t, 4>> codes(all.size());
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, pass->framebuffer());
+    glReadPixels(0, 0, kWidth, kHeight, GL_RGBA_INTEGER, GL_UNSIGNED_SHORT, codes.data());
+    glFinish();
+
+    CompensatePass::Counts counted;
+    int borderline = 0;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const auto x = static_cast<std::uint32_t>(i % kWidth);
+      const auto y = static_cast<std::uint32_t>(i / kWidth);
+      const Vector3d target = all[i].head<3>().cast<double>();
+      const auto wanted = cpu.pixel(
+          target, all[i][3], vignetting(static_cast<int>(x), static_cast<int>(y)), x, y, kSeed);
+      const auto state = static_cast<PixelState>(codes[i][3] >> 14U);
+      const double loss = (codes[i][3] & 0x3fffU) / 64.0;
+      counted.covered += state != PixelState::kNotCovered ? 1 : 0;
+      counted.out_of_gamut += state == PixelState::kOutOfGamut ? 1 : 0;
+      counted.out_of_reach += state == PixelState::kOutOfReach ? 1 : 0;
+      counted.gamut_loss += loss;
+      if (state != wanted.state) {  // within rounding of the floor or of the gamut's tolerance
+        ++borderline;
+        continue;
+      }
+      const bool mapped = state == PixelState::kOutOfGamut;
+      const double allowed = mapped ? kMappedTolerance : kDriveTolerance;
+      if (wanted.gamut_loss < 100) {
+        ASSERT_NEAR(loss, wanted.gamut_loss, kLossTolerance) << all[i].transpose();
+      }
+      for (std::size_t c = 0; c < 3; ++c) {
+        // The code that the CPU takes, or one that it would take for a drive within the tolerance.
+        const double t = wanted.drive[static_cast<int>(c)];
+        const auto& tone = cpu.tone_levels()[c];
+        const auto least = tone.bracket(std::max(t - allowed, 0.0)).lower;
+        const auto most = tone.bracket(std::min(t + allowed, 1.0)).upper;
+        ASSERT_GE(codes[i][c], std::min(least, wanted.codes[c]))
+            << all[i].transpose() << " at " << i;
+        ASSERT_LE(codes[i][c], std::max(most, wanted.codes[c]))
+            << all[i].transpose() << " at " << i;
+        if (state == PixelState::kInGamut && codes[i][c] != wanted.codes[c]) ++borderline;
+      }
+    }
+    EXPECT_LT(borderline, 0.005 * all.size());
+
+    const CompensatePass::Counts& counts = pass->counts();
+    EXPECT_EQ(counts.covered, counted.covered);
+    EXPECT_EQ(counts.out_of_gamut, counted.out_of_gamut);
+    EXPECT_EQ(counts.out_of_reach, counted.out_of_reach);
+    EXPECT_DOUBLE_EQ(counts.gamut_loss, counted.gamut_loss);
+    EXPECT_GT(counts.out_of_gamut, all.size() / 20);
+    EXPECT_GT(counts.out_of_reach, all.size() / 200);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Options,
+                         CompensatePassTest,
+                         ::testing::Values(RendererOptions{},
+                                           RendererOptions{.dither = false},
+                                           RendererOptions{.compensate = false}));
+
+TEST(CompensatePass, NeverWaitsForCounts) {
+  auto context = EglContext::create();
+  if (!context) GTEST_SKIP() << context.error().what;
+  const auto profile = example_profile(kWidth, kHeight, 8);
+  const Image<float> vignetting = vignetting_raster(profile);
+  auto pass = CompensatePass::create(Compensation(profile, {}), vignetting.view());
+  ASSERT_TRUE(pass) << pass.error().what;
+  EXPECT_EQ(pass->counts().covered, 0U);
+  const GlTexture texture = make_texture_2d(GL_RGBA32F, kWidth, kHeight);
+  for (int covered = 0; covered < 10; ++covered) {  // more frames than the ring is long
+    std::vector<Vector4f> all(kWidth * kHeight, Vector4f::Zero());
+    for (int i = 0; i <= covered; ++i)
+      all[static_cast<std::size_t>(i * 501)] = Vector4f(5, 5, 5, 1);
+    glTextureSubImage2D(texture.id(), 0, 0, 0, kWidth, kHeight, GL_RGBA, GL_FLOAT, all.data());
+    pass->run(texture.id(), 0);
+  }
+  glFinish();
+  EXPECT_EQ(pass->counts().covered, 10U);
+}
+
+}  // namespace
+}  // namespace veneer::render

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/compensation.h"
+
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/dither.h"
+#include "render/ipt.h"
+
+namespace veneer::render {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// The curve of a display that follows IEC 61966-2-1.
+std::vector<double> srgb_curve(int bits) {
+  std::vector<double> curve(std::size_t{1} << static_cast<unsigned>(bits));
+  for (std::size_t i = 0; i < curve.size(); ++i)
+    curve[i] = srgb_decode(static_cast<double>(i) / static_cast<double>(curve.size() - 1));
+  return curve;
+}
+
+std::array<ToneLevels, 3> levels_of(const calibration::ProjectorProfile& profile, bool compensate) {
+  if (compensate) {
+    const auto& curves = profile.tone_curves;
+    return {ToneLevels(curves[0]), ToneLevels(curves[1]), ToneLevels(curves[2])};
+  }
+  const ToneLevels srgb(srgb_curve(profile.bits));
+  return {srgb, srgb, srgb};
+}
+
+Compensation::Constants constants_of(const calibration::ProjectorProfile& profile,
+                                     const RendererOptions& options) {
+  Compensation::Constants c;
+  c.compensate = options.compensate;
+  c.dither = options.dither;
+  const Xyz full = profile.primaries * Vector3d::Ones();
+  if (options.compensate) {
+    c.geometry_floor = options.geometry_floor;
+    const Matrix3d inverse_primaries = profile.primaries.inverse();
+    c.drive_from_target = inverse_primaries * profile.surface.inverse();
+    c.drive_of_ambient = inverse_primaries * profile.ambient;
+    c.drive_of_black = inverse_primaries * profile.black;
+  } else {
+    c.geometry_floor = 0;
+    c.drive_from_target = srgb_from_xyz() / full.y();
+    c.drive_of_ambient = Vector3d::Zero();
+    c.drive_of_black = Vector3d::Zero();
+  }
+  const Xyz white = full + profile.black;
+  const Vector3d white_cones = cones_from_xyz() * white;
+  c.cones_from_target = white_cones.cwiseInverse().asDiagonal() * cones_from_xyz();
+  c.drive_from_cones = c.drive_from_target * c.cones_from_target.inverse();
+  c.cones_from_drive = c.drive_from_cones.inverse();
+  c.drive_of_white = c.drive_from_target * white;
+  return c;
+}
+
+bool is_inside(const Vector3d& drive, double tolerance) {
+  return drive.minCoeff() >= -tolerance && drive.maxCoeff() <= 1.0 + tolerance;
+}
+
+}  // namespace
+
+Compensation::Compensation(const calibration::ProjectorProfile& profile,
+                           const RendererOptions& options)
+    : constants_(constants_of(profile, options)),
+      tone_levels_(levels_of(profile, options.compensate)) {}
+
+// pixel.drive holds t as solved, outside [0, 1]; leaves it inside, with the loss.
+void Compensation::map_to_gamut(const Xyz& target, double g, CompensatedPixel& pixel) const {
+  const Constants& c = constants_;
+  const Vector3d offset = c.drive_of_ambient / g + c.drive_of_black;
+  const auto drive_of = [&](const Vector3d& cones) -> Vector3d {
+    return c.drive_from_cones * cones / g - offset;
+  };
+  const Ipt wanted = ipt_from_cones(c.cones_from_target * target);
+
+  // The neutral s W needs the drive s a - offset: reachable for s in [darkest, brightest].
+  double darkest = 0.0;
+  double brightest = HUGE_VAL;
+  for (int i = 0; i < 3; ++i) {
+    const double a = c.drive_of_white[i] / g;
+    const double at_zero = offset[i] / a;
+    const double at_one = (1.0 + offset[i]) / a;
+    darkest = std::max(darkest, std::min(at_zero, at_one));
+    brightest = std::min(brightest, std::max(at_zero, at_one));
+  }
+  if (!(darkest <= brightest)) {
+    pixel.drive = pixel.drive.cwiseMax(0.0).cwiseMin(1.0);
+    const Vector3d shown = c.cones_from_drive * ((pixel.drive + offset) * g);
+    pixel.gamut_loss = 100.0 * (wanted - ipt_from_cones(shown)).norm();
+    return;
+  }
+  const double low = std::pow(darkest, kIptExponent);
+  const double high = std::pow(brightest, kIptExponent);
+  const double quarter = 0.25 * (high - low);
+  const Ipt anchor(std::clamp(wanted.x(), low + quarter, high - quarter), 0.0, 0.0);
+  const Ipt way = wanted - anchor;
+  double kept = 0.0;
+  double step = 0.5;
+  for (int i = 0; i < kGamutSteps; ++i, step *= 0.5) {
+    if (is_inside(drive_of(cones_from_ipt(anchor + (kept + step) * way)), 0.0)) kept += step;
+  }
+  pixel.drive = drive_of(cones_from_ipt(anchor + kept * way)).cwiseMax(0.0).cwiseMin(1.0);
+  pixel.gamut_loss = 100.0 * (1.0 - kept) * way.norm();
+}
+
+CompensatedPixel Compensation::pixel(const Xyz& target,
+                                     double geometry,
+                                     double vignetting,
+                                     std::uint32_t x,
+                                     std::uint32_t y,
+                                     std::uint32_t dither_seed) const {
+  CompensatedPixel result;
+  if (geometry <= 0.0) return result;
+  const double g = constants_.compensate ? geometry * vignetting : 1.0;
+  if (!target.allFinite() || !std::isfinite(geometry) || !(g >= constants_.geometry_floor)) {
+    result.state = PixelState::kOutOfReach;
+    return result;
+  }
+  result.state = PixelState::kInGamut;
+  result.drive = (constants_.drive_from_target * target - constants_.drive_of_ambient) / g -
+                 constants_.drive_of_black;
+  if (!is_inside(result.drive, kGamutTolerance)) {
+    result.state = PixelState::kOutOfGamut;
+    if (constants_.compensate) map_to_gamut(target, g, result);
+  }
+  result.drive = result.drive.cwiseMax(0.0).cwiseMin(1.0);
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    const ToneLevels::Bracket bracket = tone_levels_[i].bracket(result.drive[i]);
+    const double threshold = constants_.dither ? dither_threshold(x, y, i, dither_seed) : 0.5;
+    result.codes[i] = bracket.fraction > threshold ? bracket.upper : bracket.lower;
+  }
+  return result;
+}
+
+Image<float> vignetting_raster(const calibration::ProjectorProfile& profile) {
+  const int width = profile.geometry.width;
+  const int height = profile.geometry.height;
+  Image<float> raster(width, height, 1.0F);
+  const Image<float>& map = profile.vignetting;
+  if (map.empty()) return raster;
+  // Between which two of `size` samples the centre of pixel i of `count` lies, and how far along.
+  struct Between {
+    int first, second;
+    double part;
+  };
+  const auto locate = [](int i, int count, int size) {
+    const double position = std::clamp((i + 0.5) * size / count - 0.5, 0.0, size - 1.0);
+    const int first = std::min(static_cast<int>(position), size - 1);
+    return Between{first, std::min(first + 1, size - 1), position - first};
+  };
+  for (int y = 0; y < height; ++y) {
+    const Between v = locate(y, height, map.height());
+    for (int x = 0; x < width; ++x) {
+      const Between u = locate(x, width, map.width());
+      const double top = std::lerp(map(u.first, v.first), map(u.second, v.first), u.part);
+      const double bottom = std::lerp(map(u.first, v.second), map(u.second, v.second), u.part);
+      raster(x, y) = static_cast<float>(std::lerp(top, bottom, v.part));
+    }
+  }
+  return raster;
+}
+
+}  // namespace veneer::render

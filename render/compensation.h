@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+#include <array>
+#include <cstdint>
+
+#include "base/colour.h"
+#include "calibration/profile.h"
+#include "render/renderer.h"
+#include "render/tone_levels.h"
+
+namespace veneer::render {
+
+/// What became of a pixel. The numbers are those that the shader stores.
+enum class PixelState : std::uint8_t {
+  kNotCovered = 0,
+  kInGamut = 1,
+  kOutOfGamut = 2,
+  kOutOfReach = 3
+};
+
+struct CompensatedPixel {
+  PixelState state = PixelState::kNotCovered;
+  Eigen::Vector3d drive = Eigen::Vector3d::Zero();  ///< t, linear, in [0, 1]
+  double gamut_loss = 0;                            ///< dE in IPT x 100 that gamut mapping made
+  std::array<std::uint16_t, 3> codes{};
+};
+
+/// A drive may be this far outside [0, 1] before it counts as out of gamut; it is clamped there.
+/// One step of the half floats in which the target is drawn, at full drive.
+inline constexpr double kGamutTolerance = 0x1p-11;
+/// Halvings in the search for the reachable chroma: it is found to one part in 4096 of the
+/// target's, far below a step of the codes.
+inline constexpr int kGamutSteps = 12;
+
+/// Compensation in double precision: what shaders/compensate.frag does, pixel by pixel.
+///
+/// With the model of ProjectorProfile, t = (M^-1 A^-1 L - M^-1 E) / G - M^-1 k. Where a component
+/// of t is outside [0, 1] (over white, over a primary, under black and ambient), the target is
+/// moved in IPT, relative to the white M 1 + k, on a straight line to a point of the achromatic
+/// axis, as little as brings it into reach: hue is kept exactly. That point's lightness is the
+/// target's, kept within the middle half of the neutrals that this pixel can show, so that a bright
+/// colour loses some lightness and some chroma instead of turning white. Where no neutral can be
+/// shown at all (a strongly coloured surface in strong ambient light) t is clamped and hue is lost.
+/// The codes bracket t in linear light; dither picks one of the two (dither.h), or the nearer one
+/// without dither.
+///
+/// Without RendererOptions::compensate, t is linear sRGB of the target over the luminance of M 1,
+/// cut to [0, 1], and the codes are its sRGB encoding: what is shown by someone who knows nothing
+/// of the projector or the surface.
+///
+/// A target or geometry that is not finite, and G below the floor, are out of reach: drive 0.
+class Compensation {
+ public:
+  /// @param profile  must pass check().
+  Compensation(const calibration::ProjectorProfile& profile, const RendererOptions& options);
+
+  /// @param target  XYZ in cd/m^2.
+  /// @param geometry  cos(theta_p) (r_ref / r)^2; <= 0 is not covered.
+  /// @param vignetting  at this pixel.
+  [[nodiscard]] CompensatedPixel pixel(const Xyz& target,
+                                       double geometry,
+                                       double vignetting,
+                                       std::uint32_t x,
+                                       std::uint32_t y,
+                                       std::uint32_t dither_seed) const;
+
+  /// What the solution is made of; the shader gets the same numbers in single precision.
+  struct Constants {
+    bool compensate = true;
+    bool dither = true;
+    double geometry_floor = 0;
+    Eigen::Matrix3d drive_from_target;  ///< M^-1 A^-1
+    Eigen::Vector3d drive_of_ambient;   ///< M^-1 E
+    Eigen::Vector3d drive_of_black;     ///< M^-1 k
+    Eigen::Matrix3d cones_from_target;  ///< relative to the white's
+    Eigen::Matrix3d drive_from_cones;
+    Eigen::Matrix3d cones_from_drive;
+    Eigen::Vector3d drive_of_white;  ///< M^-1 A^-1 W
+  };
+  [[nodiscard]] const Constants& constants() const { return constants_; }
+  [[nodiscard]] const std::array<ToneLevels, 3>& tone_levels() const { return tone_levels_; }
+
+ private:
+  void map_to_gamut(const Xyz& target, double g, CompensatedPixel& pixel) const;
+  Constants constants_;
+  std::array<ToneLevels, 3> tone_levels_;
+};
+
+/// The profile's vignetting at every pixel of its raster, stretched over it bilinearly with the
+/// outer texel centres' values kept to the edge; 1 everywhere where the profile has none.
+[[nodiscard]] Image<float> vignetting_raster(const calibration::ProjectorProfile& profile);
+
+}  // namespace veneer::render

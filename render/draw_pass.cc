@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/draw_pass.h"
+
+#include <array>
+#include <cstddef>
+#include <numbers>
+
+#include "base/colour.h"
+
+namespace veneer::render {
+namespace {
+
+constexpr char kFrameGlsl[] =
+#include "render/shaders/frame.glsl.inc"
+    ;
+constexpr char kDrawVert[] =
+#include "render/shaders/draw.vert.inc"
+    ;
+constexpr char kDrawFrag[] =
+#include "render/shaders/draw.frag.inc"
+    ;
+
+// The block Frame of frame.glsl, with room for every light; a program reads as much as it declares.
+struct FrameBlock {
+  Eigen::Matrix4f clip_from_object;
+  Eigen::Matrix4f xyz_from_rgb;
+  Eigen::Vector4f eye;
+  Eigen::Vector4f projector;
+  Eigen::Vector4f texture_repeats;
+  std::array<Eigen::Vector4f, 2 * kMaxLights> lights;  // lights[n], then light_rgb[n]
+};
+static_assert(offsetof(FrameBlock, lights) == 2 * 64 + 3 * 16);
+
+std::string header(int light_count) {
+  return fmt::format("#version 450 core\n#define LIGHT_COUNT {}\n", light_count) + kFrameGlsl;
+}
+
+Eigen::Vector4f homogeneous(const Eigen::Vector3d& v, double w) {
+  return Eigen::Vector4d(v.x(), v.y(), v.z(), w).cast<float>();
+}
+
+struct LightUniform {
+  Eigen::Vector4f light;
+  Eigen::Vector4f rgb;
+};
+
+LightUniform uniform_of(const Light& light, const RigidTransform& object_from_world) {
+  // A material's sample is its radiance times pi over the irradiance.
+  if (const auto* sun = std::get_if<DirectionalLight>(&light))
+    return {homogeneous(object_from_world.rotation * sun->direction_to_light, 0.0),
+            homogeneous(sun->illuminance_rgb / std::numbers::pi, 0.0)};
+  const auto& lamp = std::get<PointLight>(light);
+  return {homogeneous(object_from_world * lamp.position, 1.0),
+          homogeneous(lamp.intensity_rgb / std::numbers::pi, 0.0)};
+}
+
+}  // namespace
+
+Eigen::Matrix4d clip_from_projector(const calibration::ProjectorGeometry& g) {
+  Eigen::Matrix4d m = Eigen::Matrix4d::Zero();
+  m(0, 0) = 2.0 * g.fx / g.width;
+  m(0, 2) = 2.0 * g.cx / g.width - 1.0;
+  m(1, 1) = 2.0 * g.fy / g.height;
+  m(1, 2) = 2.0 * g.cy / g.height - 1.0;
+  m(2, 3) = kNearPlane;
+  m(3, 2) = 1.0;
+  return m;
+}
+
+std::string draw_vertex_source(int light_count) { return header(light_count) + kDrawVert; }
+
+std::string draw_fragment_source(const std::string& model_source, int light_count) {
+  return header(light_count) + model_source + "\n" + kDrawFrag;
+}
+
+Result<DrawPass> DrawPass::create(const btf::ModelShader& shader,
+                                  std::vector<Light> lights,
+                                  const Eigen::Vector2d& texture_repeats,
+                                  const calibration::ProjectorProfile& profile) {
+  VENEER_CHECK(!lights.empty() && lights.size() <= kMaxLights);
+  const auto light_count = static_cast<int>(lights.size());
+  DrawPass pass;
+  VENEER_ASSIGN(pass.program_,
+                link_program({{GL_VERTEX_SHADER, "draw.vert", draw_vertex_source(light_count)},
+                              {GL_FRAGMENT_SHADER,
+                               "draw.frag with the material's model",
+                               draw_fragment_source(shader.source, light_count)}}));
+  VENEER_ASSIGN(pass.textures_, ModelTextures::upload(shader, pass.program_.id()));
+  pass.uniforms_ = make_buffer(nullptr, sizeof(FrameBlock), GL_DYNAMIC_STORAGE_BIT);
+  pass.lights_ = std::move(lights);
+  pass.texture_repeats_ = texture_repeats;
+  const calibration::ProjectorGeometry& geometry = profile.geometry;
+  pass.clip_from_world_ =
+      clip_from_projector(geometry) * geometry.world_from_projector.inverse().matrix();
+  pass.projector_in_world_ = geometry.world_from_projector.translation;
+  pass.reference_distance_m_ = profile.reference_distance_m;
+  pass.width_ = geometry.width;
+  pass.height_ = geometry.height;
+  return pass;
+}
+
+void DrawPass::draw(const MeshBuffers& mesh, const DrawInput& input) const {
+  const RigidTransform object_from_world = input.world_from_object.inverse();
+  FrameBlock block;
+  block.clip_from_object = (clip_from_world_ * input.world_from_object.matrix()).cast<float>();
+  block.xyz_from_rgb = Eigen::Matrix4f::Identity();
+  block.xyz_from_rgb.topLeftCorner<3, 3>() = xyz_from_srgb().cast<float>();
+  block.eye = homogeneous(object_from_world * input.eye_in_world, 1.0);
+  block.projector = homogeneous(object_from_world * projector_in_world_,
+                                reference_distance_m_ * reference_distance_m_);
+  block.texture_repeats =
+      Eigen::Vector4d(texture_repeats_.x(), texture_repeats_.y(), 0, 0).cast<float>();
+  for (std::size_t i = 0; i < lights_.size(); ++i) {
+    const LightUniform light = uniform_of(lights_[i], object_from_world);
+    block.lights[i] = light.light;
+    block.lights[lights_.size() + i] = light.rgb;
+  }
+  glNamedBufferSubData(uniforms_.id(), 0, sizeof(block), &block);
+
+  glViewport(0, 0, width_, height_);
+  glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+  glDisable(GL_BLEND);
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_GREATER);
+  glClearDepth(0.0);
+  glClearColor(0.0F, 0.0F, 0.0F, 0.0F);
+  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  glUseProgram(program_.id());
+  glBindBufferBase(GL_UNIFORM_BUFFER, 0, uniforms_.id());
+  textures_.bind();
+  mesh.draw();
+}
+
+}  // namespace veneer::render

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Internal to render/.
+
+#include <Eigen/Core>
+
+#include <string>
+#include <vector>
+
+#include "base/rigid_transform.h"
+#include "btf/model_shader.h"
+#include "calibration/profile.h"
+#include "render/gl_objects.h"
+#include "render/mesh_buffers.h"
+#include "render/model_textures.h"
+#include "render/scene.h"
+
+namespace veneer::render {
+
+/// Clip coordinates from the projector's frame. Row 0 of the framebuffer is the first row of the
+/// raster, so that nothing needs flipping and gl_FragCoord is the projector's pixel coordinate.
+/// Depth is near / z in [0, 1], larger is nearer: a float keeps its precision at any distance.
+[[nodiscard]] Eigen::Matrix4d clip_from_projector(const calibration::ProjectorGeometry& geometry);
+/// Nothing nearer than this is drawn; no projector is in focus there.
+inline constexpr double kNearPlane = 0.01;  // metres
+
+/// The sources of the draw program for a model and a number of lights, complete and compilable.
+[[nodiscard]] std::string draw_vertex_source(int light_count);
+[[nodiscard]] std::string draw_fragment_source(const std::string& model_source, int light_count);
+
+/// Where a frame is seen from and drawn on.
+struct DrawInput {
+  Eigen::Vector3d eye_in_world;
+  RigidTransform world_from_object;
+};
+
+/// Draws a mesh in a material, as the projector sees it, into an RGBA16F target with depth: XYZ in
+/// cd/m^2 and the geometric factor (draw.frag). Needs a current context, always the same.
+class DrawPass {
+ public:
+  /// Errors: kUnavailable (the driver refuses the shader, a texture is too large).
+  [[nodiscard]] static Result<DrawPass> create(const btf::ModelShader& shader,
+                                               std::vector<Light> lights,
+                                               const Eigen::Vector2d& texture_repeats,
+                                               const calibration::ProjectorProfile& profile);
+  /// Clears the bound framebuffer and draws. Sets all GL state that it needs.
+  void draw(const MeshBuffers& mesh, const DrawInput& input) const;
+
+ private:
+  DrawPass() = default;
+  GlProgram program_;
+  ModelTextures textures_;
+  GlBuffer uniforms_;
+  std::vector<Light> lights_;
+  Eigen::Vector2d texture_repeats_;
+  Eigen::Matrix4d clip_from_world_;
+  Eigen::Vector3d projector_in_world_;
+  double reference_distance_m_ = 1.0;
+  int width_ = 0;
+  int height_ = 0;
+};
+
+}  // namespace veneer::render

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "base/result.h"
+
+namespace veneer::render {
+
+/// An OpenGL 4.5 core context without a window or a display server, made current on the thread that
+/// creates it. Bound to that thread.
+///
+/// Where several drivers are installed the first that gives such a context is taken: hardware
+/// through EGL_EXT_platform_device (NVIDIA's driver, and Mesa's for a GPU), then Mesa's surfaceless
+/// platform, then software through the device platform. The environment variable VENEER_EGL narrows
+/// that to platforms whose name contains its value ("surfaceless", "device 1"). In debug builds,
+/// and wherever VENEER_GL_DEBUG is set, GL reports its errors through KHR_debug to the log.
+class EglContext {
+ public:
+  /// Errors: kUnavailable; says what was tried, what each said and what to install.
+  [[nodiscard]] static Result<EglContext> create();
+  EglContext(EglContext&&) noexcept;
+  EglContext& operator=(EglContext&&) = delete;
+  ~EglContext();
+
+  /// Makes this context the thread's current one; costs next to nothing where it already is.
+  void make_current() const;
+  /// "llvmpipe (LLVM 15.0.6, 256 bits), 4.5 (Core Profile) Mesa 22.3.6, through surfaceless".
+  [[nodiscard]] const std::string& description() const;
+
+ private:
+  struct State;
+  explicit EglContext(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace veneer::render

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/renderer.h"
+
+#include <cmath>
+
+#include "render/compensate_pass.h"
+#include "render/compensation.h"
+#include "render/draw_pass.h"
+#include "render/egl_context.h"
+#include "render/gpu_timer.h"
+#include "render/ipt.h"
+#include "render/mesh_buffers.h"
+
+namespace veneer::render {
+namespace {
+
+Status check(const Scene& scene) {
+  const Mesh& mesh = scene.mesh;
+  if (scene.lights.empty() || scene.lights.size() > kMaxLights)
+    return fail(Errc::kBadFormat,
+                "making a renderer: the scene has {} lights; 1 to {} can be drawn",
+                scene.lights.size(),
+                kMaxLights);
+  const std::size_t count = mesh.positions.size();
+  if (mesh.triangles.empty() || mesh.normals.size() != count ||
+      mesh.texture_coordinates.size() != count)
+    return fail(Errc::kBadFormat,
+                "making a renderer: the mesh has {} triangles, {} positions, {} normals and {} "
+                "texture coordinates; it needs triangles, and one of the others for every vertex",
+                mesh.triangles.size(),
+                count,
+                mesh.normals.size(),
+                mesh.texture_coordinates.size());
+  for (const auto& triangle : mesh.triangles) {
+    for (const std::uint32_t vertex : triangle) {
+      if (vertex >= count)
+        return fail(Errc::kBadFormat,
+                    "making a renderer: a triangle of the mesh names vertex {} of {}",
+                    vertex,
+                    count);
+    }
+  }
+  return {};
+}
+
+Status check(const calibration::ProjectorProfile& profile, const RendererOptions& options) {
+  if (!(options.geometry_floor > 0.0) || !std::isfinite(options.geometry_floor))
+    return fail(Errc::kInvalidOption,
+                "making a renderer: geometry_floor is {}; it must be above 0",
+                options.geometry_floor);
+  VENEER_TRY(profile.check());
+  const Xyz white = profile.primaries * Eigen::Vector3d::Ones() + profile.black;
+  if (!((cones_from_xyz() * white).minCoeff() > 0.0))
+    return fail(
+        Errc::kBadFormat,
+        "making a renderer: the profile's white, XYZ {} {} {}, is no colour that an eye can "
+        "see; calibrate again",
+        white.x(),
+        white.y(),
+        white.z());
+  return {};
+}
+
+class GlRenderer final : public Renderer {
+ public:
+  static Result<std::unique_ptr<Renderer>> create(EglContext context,
+                                                  const Scene& scene,
+                                                  const btf::Material& material,
+                                                  const calibration::ProjectorProfile& profile,
+                                                  const RendererOptions& options) {
+    VENEER_ASSIGN(
+        DrawPass draw,
+        DrawPass::create(material.shader(), scene.lights, scene.texture_repeats, profile));
+    const Compensation compensation(profile, options);
+    const Image<float> vignetting = vignetting_raster(profile);
+    VENEER_ASSIGN(CompensatePass compensate,
+                  CompensatePass::create(compensation, vignetting.view()));
+    auto renderer = std::unique_ptr<GlRenderer>(new GlRenderer(
+        std::move(context), scene.mesh, profile.geometry, std::move(draw), std::move(compensate)));
+    if (glCheckNamedFramebufferStatus(renderer->target_framebuffer_.id(), GL_FRAMEBUFFER) !=
+        GL_FRAMEBUFFER_COMPLETE)
+      return fail(Errc::kUnavailable,
+                  "making a renderer: this GL cannot draw to half floats with depth");
+    return renderer;
+  }
+
+  ~GlRenderer() override { context_.make_current(); }
+
+  void draw(const FrameInput& input) override {
+    context_.make_current();
+    timer_.begin();
+    glBindFramebuffer(GL_FRAMEBUFFER, target_framebuffer_.id());
+    draw_.draw(mesh_, {input.eye_in_world, input.world_from_object});
+    compensate_.run(target_.id(), input.dither_seed);
+    timer_.end();
+    glFlush();
+  }
+
+  void read_codes(ImageView<Rgb16> codes) override {
+    static_assert(sizeof(Rgb16) == 3 * sizeof(std::uint16_t));
+    read(compensate_.framebuffer(), GL_RGB_INTEGER, GL_UNSIGNED_SHORT, codes);
+  }
+
+  void read_target(ImageView<Rgb32f> target_xyz) override {
+    static_assert(sizeof(Rgb32f) == 3 * sizeof(float));
+    read(target_framebuffer_.id(), GL_RGB, GL_FLOAT, target_xyz);
+  }
+
+  void finish() override {
+    context_.make_current();
+    glFinish();
+  }
+
+  FrameStatistics statistics() override {
+    context_.make_current();
+    const CompensatePass::Counts& counts = compensate_.counts();
+    FrameStatistics statistics;
+    statistics.covered_pixels = counts.covered;
+    statistics.out_of_gamut_pixels = counts.out_of_gamut;
+    statistics.out_of_reach_pixels = counts.out_of_reach;
+    if (counts.covered > 0)
+      statistics.gamut_loss_mean = counts.gamut_loss / static_cast<double>(counts.covered);
+    statistics.gpu_ms = timer_.milliseconds();
+    return statistics;
+  }
+
+  std::string description() const override { return context_.description(); }
+
+ private:
+  GlRenderer(EglContext context,
+             const Mesh& mesh,
+             const calibration::ProjectorGeometry& geometry,
+             DrawPass draw,
+             CompensatePass compensate)
+      : context_(std::move(context)),
+        width_(geometry.width),
+        height_(geometry.height),
+        mesh_(mesh),
+        target_(make_texture_2d(GL_RGBA16F, width_, height_)),
+        depth_(make_texture_2d(GL_DEPTH_COMPONENT32F, width_, height_)),
+        target_framebuffer_(make_framebuffer()),
+        draw_(std::move(draw)),
+        compensate_(std::move(compensate)) {
+    glNamedFramebufferTexture(target_framebuffer_.id(), GL_COLOR_ATTACHMENT0, target_.id(), 0);
+    glNamedFramebufferTexture(target_framebuffer_.id(), GL_DEPTH_ATTACHMENT, depth_.id(), 0);
+  }
+
+  // Rows come as they lie in the framebuffer, whose row 0 is the raster's first
+  // (clip_from_projector).
+  template <class Pixel>
+  void read(GLuint framebuffer, GLenum format, GLenum type, ImageView<Pixel> pixels) {
+    VENEER_CHECK(pixels.width() == width_ && pixels.height() == height_);
+    context_.make_current();
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer);
+    glPixelStorei(GL_PACK_ALIGNMENT, 2);
+    glPixelStorei(GL_PACK_ROW_LENGTH, static_cast<GLint>(pixels.stride()));
+    glReadPixels(0, 0, width_, height_, format, type, pixels.data());
+  }
+
+  EglContext context_;  // first, so that it goes last
+  int width_;
+  int height_;
+  MeshBuffers mesh_;
+  GlTexture target_;
+  GlTexture depth_;
+  GlFramebuffer target_framebuffer_;
+  DrawPass draw_;
+  CompensatePass compensate_;
+  GpuTimer timer_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Renderer>> Renderer::create(const Scene& scene,
+                                                   const btf::Material& material,
+                                                   const calibration::ProjectorProfile& profile,
+                                                   const RendererOptions& options) {
+  VENEER_TRY(check(scene));
+  VENEER_TRY(check(profile, options));
+  VENEER_ASSIGN(EglContext context, EglContext::create());
+  return GlRenderer::create(std::move(context), scene, material, profile, options);
+}
+
+}  // namespace veneer::render

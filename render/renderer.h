@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "base/image.h"
+#include "base/result.h"
+#include "base/rigid_transform.h"
+#include "btf/material.h"
+#include "calibration/profile.h"
+#include "render/scene.h"
+
+namespace veneer::render {
+
+struct RendererOptions {
+  /// Off: the target's luminance is sent as if projector and surface were ideal (sRGB of the target
+  /// over the white of the profile), which is what people do without calibration.
+  bool compensate = true;
+  bool dither = true;
+  /// Below this G a point is out of the projector's reach and stays black. > 0.
+  double geometry_floor = 0.05;
+};
+
+/// What one frame needs to know.
+struct FrameInput {
+  Eigen::Vector3d eye_in_world;
+  RigidTransform world_from_object;
+  std::uint32_t dither_seed = 0;
+};
+
+/// What one frame did, read without waiting for the GPU (so it may be of an earlier frame).
+struct FrameStatistics {
+  std::uint64_t covered_pixels = 0;
+  std::uint64_t out_of_gamut_pixels = 0;  ///< of the covered ones, before gamut mapping
+  std::uint64_t out_of_reach_pixels = 0;  ///< below the geometry floor
+  double gamut_loss_mean =
+      0;  ///< mean colour difference dE in IPT x 100 that mapping made, over the covered
+  std::optional<double> gpu_ms;  ///< GL timer query: draw and compensation
+};
+
+/// Draws a scene's material as the projector must show it. Owns the EGL context and every GL
+/// object; bound to the thread that made it.
+class Renderer {
+ public:
+  /// Errors: kUnavailable (no EGL, no GL 4.5; says what there is), kBadFormat.
+  [[nodiscard]] static Result<std::unique_ptr<Renderer>> create(
+      const Scene& scene,
+      const btf::Material& material,
+      const calibration::ProjectorProfile& profile,
+      const RendererOptions& options);
+  virtual ~Renderer() = default;
+
+  /// Issues the GL commands of one frame. No allocation, no read-back, no wait.
+  virtual void draw(const FrameInput& input) = 0;
+  /// Waits for the last frame and reads it: codes of ProjectorProfile::bits bits, first row on top.
+  virtual void read_codes(ImageView<Rgb16> codes) = 0;
+  /// The same for the target luminance before compensation, XYZ in cd/m^2 (0 outside the object).
+  virtual void read_target(ImageView<Rgb32f> target_xyz) = 0;
+  /// Waits until the GPU is done with the last frame (outputs that want no pixels still need this
+  /// to time a frame).
+  virtual void finish() = 0;
+  [[nodiscard]] virtual FrameStatistics statistics() = 0;
+  /// GL renderer and version, for logs and reports.
+  [[nodiscard]] virtual std::string description() const = 0;
+};
+
+}  // namespace veneer::render

@@ -1,0 +1,19 @@
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 normal;
+layout(location = 2) in vec3 tangent;
+layout(location = 3) in vec2 texture_coordinate;
+
+out Surface {
+  vec3 position;
+  vec3 normal;
+  vec3 tangent;
+  vec2 uv;
+} surface;
+
+void main() {
+  surface.position = position;
+  surface.normal = normal;
+  surface.tangent = tangent;
+  surface.uv = texture_coordinate * frame.texture_repeats.xy;
+  gl_Position = frame.clip_from_object * vec4(position, 1.0);
+}
