@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/random.h"
-
 namespace veneer::simulation {
 
 namespace {
@@ -15,10 +13,17 @@ int wrapped(int index, int period) { return ((index % period) + period) % period
 }  // namespace
 
 double lattice_random(int column, int row, std::uint64_t seed) {
-  const auto point = (static_cast<std::uint64_t>(static_cast<std::uint32_t>(column)) << 32U) |
-                     static_cast<std::uint32_t>(row);
-  Pcg32 random(seed * 0x9E3779B97F4A7C15ULL + point, seed);
-  return random.uniform();
+  // Neighbouring points must have nothing in common, so every bit is mixed into every other.
+  // Source: Steele, Lea, Flood 2014, "Fast Splittable Pseudorandom Number Generators", mix64.
+  const auto mixed = [](std::uint64_t z) {
+    z = (z ^ (z >> 30U)) * 0xBF58476D1CE4E5B9ULL;
+    z = (z ^ (z >> 27U)) * 0x94D049BB133111EBULL;
+    return z ^ (z >> 31U);
+  };
+  const std::uint64_t point =
+      (static_cast<std::uint64_t>(static_cast<std::uint32_t>(column)) << 32U) |
+      static_cast<std::uint32_t>(row);
+  return static_cast<double>(mixed(mixed(seed + 0x9E3779B97F4A7C15ULL) ^ point) >> 11U) * 0x1p-53;
 }
 
 double smooth_step(double low, double high, double value) {
