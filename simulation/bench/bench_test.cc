@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulation/bench.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "base/random.h"
+#include "simulation/bench/testing.h"
+
+namespace veneer::simulation {
+namespace {
+
+using testing::add_square;
+using testing::plain_truth;
+using testing::square;
+using testing::turned;
+using testing::uniform_frame;
+
+constexpr double kFloat = 2e-6;  // relative: pictures are kept in 32-bit floats
+constexpr Rgb16 kFull{255, 255, 255};
+
+std::unique_ptr<Bench> make_bench(const BenchTruth& truth, Mesh mesh) {
+  auto bench = Bench::create(truth, std::move(mesh));
+  EXPECT_TRUE(bench) << bench.error().what;
+  return std::move(*bench);
+}
+
+EyeView look(const Bench& bench,
+             const RigidTransform& pose = {},
+             const Eigen::Vector3d& eye = {0, 0, 1}) {
+  auto view = bench.look(pose, eye);
+  EXPECT_TRUE(view) << view.error().what;
+  return std::move(*view);
+}
+
+Image<Rgb32f> observe(const Bench& bench, const EyeView& view, const Rgb16& code) {
+  const Image<Rgb16> frame = uniform_frame(bench.truth(), code);
+  auto picture = bench.observe(view, frame.view());
+  EXPECT_TRUE(picture) << picture.error().what;
+  return std::move(*picture);
+}
+
+/// XYZ in the middle of the eye's picture, where the object's origin is, for full drive.
+Xyz centre_of(const Bench& bench, const RigidTransform& pose, const Eigen::Vector3d& eye) {
+  const EyeView view = look(bench, pose, eye);
+  return observe(bench, view, kFull)(view.width() / 2, view.height() / 2).cast<double>();
+}
+
+TEST(Bench, AWhitePlateAtTheReferenceSendsWhiteBlackAndAmbient) {
+  BenchTruth truth = plain_truth();
+  truth.projector.black_fraction = 0.01;
+  truth.room.ambient_nits = 3;
+  const auto bench = make_bench(truth, square(0.3));
+  const Xyz seen = centre_of(*bench, {}, {0, 0, 1});
+  // The middle pixel's rays end within half a pixel of the axis, where cos^3 is 1 to 1e-5.
+  EXPECT_NEAR(seen.y(), 800 * 1.01 + 3, 800 * 1e-5);
+  EXPECT_TRUE(bench->board(kFull, {32, 24}, true, false).isApprox(seen, 1e-5));
+  EXPECT_NEAR(bench->board(kFull, {32, 24}, false, true).y(), 3, 1e-9);
+}
+
+TEST(Bench, LightFallsWithTheSquareOfTheDistance) {
+  const auto bench = make_bench(plain_truth(), square(1));
+  for (const double distance : {0.5, 0.8, 1.0, 2.0}) {
+    RigidTransform pose;
+    pose.translation.z() = 1 - distance;
+    const double y = centre_of(*bench, pose, {0, 0, 1.0}).y();
+    EXPECT_NEAR(y * distance * distance, 800, 800 * 1e-5) << distance << " m";
+  }
+}
+
+TEST(Bench, LightFallsWithTheCosineOfTheSlant) {
+  BenchTruth truth = plain_truth();
+  truth.eye.vertical_fov_deg = 0.1;  // so that distance and slant do not vary over the pixel
+  const auto bench = make_bench(truth, square(0.3));
+  for (const double degrees : {0.0, 20.0, 45.0, 60.0, 80.0}) {
+    const double y = centre_of(*bench, turned(degrees, Eigen::Vector3d::UnitY()), {0, 0, 1}).y();
+    EXPECT_NEAR(y, 800 * std::cos(degrees * std::numbers::pi / 180), 800 * 1e-4) << degrees;
+  }
+}
+
+TEST(Bench, ALambertianSurfaceLooksTheSameFromEverywhere) {
+  BenchTruth truth = plain_truth();
+  truth.eye.vertical_fov_deg = 0.1;
+  const auto bench = make_bench(truth, square(0.3));
+  for (const Eigen::Vector3d& eye :
+       {Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0.6, 0, 0.4), Eigen::Vector3d(-0.3, 0.5, 2)})
+    EXPECT_NEAR(centre_of(*bench, {}, eye).y(), 800, 800 * 1e-4) << eye.transpose();
+}
+
+TEST(Bench, LightIsLinearInTheDrive) {
+  BenchTruth truth = plain_truth();
+  truth.projector.black_fraction = 0.01;
+  truth.projector.blur_px = 0.4;
+  truth.room.ambient_nits = 3;
+  truth.object.wavelength_nm = {400, 700};
+  truth.object.reflectance = {0.3, 0.9};
+  const auto bench = make_bench(truth, square(0.3));
+  const EyeView view = look(*bench);
+  const Image<Rgb32f> dark = observe(*bench, view, {0, 0, 0});
+  const Image<Rgb32f> once = observe(*bench, view, {60, 100, 20});
+  const Image<Rgb32f> twice = observe(*bench, view, {120, 200, 40});
+  for (std::size_t i = 0; i < dark.pixels().size(); ++i) {
+    const Rgb32f single = once.pixels()[i] - dark.pixels()[i];
+    const Rgb32f doubled = twice.pixels()[i] - dark.pixels()[i];
+    EXPECT_TRUE(doubled.isApprox(2 * single, 1e-5F)) << i << ": " << doubled.transpose();
+  }
+}
+
+TEST(Bench, AnEyeAtTheLensSeesTheFrameAsItIs) {
+  // The eye has the projector's pinhole, so its pixel (x, y) sees just raster pixel (x, y): a
+  // mirrored, flipped or shifted raster cannot pass.
+  const BenchTruth truth = plain_truth();
+  for (const char* kind : {"flat", "turned"}) {
+    const auto bench = make_bench(truth, square(0.5));
+    const EyeView view = look(
+        *bench, kind == std::string_view("flat") ? RigidTransform{} : turned(30, {0.6, 0.8, 0}));
+    Pcg32 random(8);
+    Image<Rgb16> frame(64, 48);
+    for (Rgb16& code : frame.pixels()) code = random.uniform() < 0.5 ? Rgb16{0, 0, 0} : kFull;
+    const auto picture = bench->observe(view, frame.view());
+    ASSERT_TRUE(picture);
+    int wrong = 0;
+    for (int y = 0; y < 48; ++y)
+      for (int x = 0; x < 64; ++x)
+        if (((*picture)(x, y).y() > 100) != (frame(x, y)[1] > 0)) ++wrong;
+    EXPECT_EQ(wrong, 0) << kind;
+  }
+}
+
+TEST(Bench, TheEdgeOfThePixelsFootprintIsAveraged) {
+  BenchTruth truth = plain_truth();
+  truth.eye.samples = 4;
+  const auto bench = make_bench(truth, square(0.5));
+  // An eye of half the resolution: every pixel sees two by two of the raster's.
+  BenchTruth coarse = truth;
+  coarse.eye.width = 32;
+  coarse.eye.height = 24;
+  const auto coarse_bench = make_bench(coarse, square(0.5));
+  Pcg32 random(9);
+  Image<Rgb16> frame(64, 48);
+  for (Rgb16& code : frame.pixels())
+    code = {static_cast<std::uint16_t>(255 * random.uniform()), 128, 7};
+  const auto fine = bench->observe(look(*bench), frame.view());
+  const auto half = coarse_bench->observe(look(*coarse_bench), frame.view());
+  ASSERT_TRUE(fine && half);
+  for (int y = 0; y < 24; ++y)
+    for (int x = 0; x < 32; ++x) {
+      const Rgb32f mean = ((*fine)(2 * x, 2 * y) + (*fine)(2 * x + 1, 2 * y) +
+                           (*fine)(2 * x, 2 * y + 1) + (*fine)(2 * x + 1, 2 * y + 1)) /
+                          4;
+      // The fine eye's rays lie at eighths, the coarse one's at quarters of a raster pixel: G
+      // differs.
+      EXPECT_TRUE((*half)(x, y).isApprox(mean, 1e-3F)) << x << ' ' << y;
+    }
+}
+
+TEST(Bench, TheFarSideOfASphereGetsNoProjectorLight) {
+  BenchTruth truth = plain_truth();
+  truth.projector.black_fraction = 0.01;
+  truth.room.ambient_nits = 3;
+  const auto mesh = load_mesh("sphere");
+  ASSERT_TRUE(mesh);
+  const auto bench = make_bench(truth, *mesh);
+  const EyeView view = look(*bench, {}, {0, 0, -1});
+  const Image<Rgb32f> picture = observe(*bench, view, kFull);
+  int on_object = 0;
+  for (std::size_t i = 0; i < picture.pixels().size(); ++i) {
+    const Coverage coverage = view.coverage.pixels()[i];
+    EXPECT_NE(coverage, Coverage::kCovered) << i;
+    if (coverage == Coverage::kOutside) {
+      EXPECT_TRUE(picture.pixels()[i].isZero());
+    }
+    if (coverage != Coverage::kUnlit) continue;
+    ++on_object;
+    EXPECT_NEAR(picture.pixels()[i].y(), 3, 3 * kFloat) << i;
+  }
+  EXPECT_GT(on_object, 500);
+}
+
+TEST(Bench, OnePartOfTheObjectShadowsAnother) {
+  Mesh mesh = square(0.3);
+  add_square(
+      mesh, 0.02, 0.5);  // half way to the lens: its shadow on the first is 0.04 m either side
+  const auto bench = make_bench(plain_truth(), mesh);
+  const EyeView view = look(*bench, {}, {1, 0, 0.6});  // from the side, past the small square
+  int shaded = 0;
+  for (std::size_t pixel = 0; pixel + 1 < view.first.size(); ++pixel) {
+    const std::size_t x = pixel % 64;
+    const std::size_t y = pixel / 64;
+    for (std::uint32_t i = view.first[pixel]; i < view.first[pixel + 1]; ++i) {
+      const EyeSample& sample = view.samples[i];
+      if (sample.triangle > 1) continue;  // on the small square itself
+      // Position in the plane from the triangle's corners: u and v weigh corners two and three.
+      const Mesh& m = mesh;
+      const auto& t = m.triangles[sample.triangle];
+      const Eigen::Vector3d p = (1.0 - sample.u - sample.v) * m.positions[t[0]] +
+                                sample.u * m.positions[t[1]] + sample.v * m.positions[t[2]];
+      const double reach = p.cwiseAbs().maxCoeff();
+      if (std::abs(reach - 0.04) < 1e-4) continue;
+      const bool on_raster = std::abs(p.x()) < 0.0999 && std::abs(p.y()) < 0.0749;
+      if (!on_raster) continue;
+      EXPECT_EQ(sample.raster_pixel < 0, reach < 0.04) << x << ' ' << y << ": " << p.transpose();
+      if (reach < 0.04) ++shaded;
+    }
+  }
+  EXPECT_GT(shaded, 50);
+}
+
+TEST(Bench, EveryDriveIsReachableAndMoreThanWhiteIsNot) {
+  BenchTruth truth = plain_truth();
+  ProjectorTruth& p = truth.projector;
+  p.channels[0].exponent = 2.2;
+  p.channels[1] = {ChannelTruth::Tone::kSCurve, 0, 2.6, 2.4, 0.5, 535, 20, 1};
+  p.leak = 0.02;
+  p.interaction = 0.05;
+  p.black_fraction = 0.002;
+  truth.room.ambient_nits = 2;
+  truth.object.reflectance = {0.7};
+  const auto bench = make_bench(truth, square(0.3));
+  const EyeView view = look(*bench, turned(35, Eigen::Vector3d::UnitX()), {0.2, 0.1, 1});
+  Pcg32 random(10);
+  int tried = 0;
+  for (int trial = 0; trial < 20; ++trial) {
+    Rgb16 code{};
+    for (auto& value : code) value = static_cast<std::uint16_t>(256 * random.uniform());
+    const Image<Rgb32f> picture = observe(*bench, view, code);
+    const Image<Rgb32f> white = observe(*bench, view, kFull);
+    for (int y = 4; y < 48; y += 7)
+      for (int x = 4; x < 64; x += 7) {
+        if (view.coverage(x, y) != Coverage::kCovered) continue;
+        double geometry = 0;
+        const std::size_t pixel = static_cast<std::size_t>(y) * 64 + static_cast<std::size_t>(x);
+        for (std::uint32_t i = view.first[pixel]; i < view.first[pixel + 1]; ++i)
+          geometry += view.samples[i].geometry;
+        geometry /= view.rays_per_pixel;
+        EXPECT_TRUE(bench->reachable(picture(x, y).cast<double>(), geometry)) << x << ' ' << y;
+        EXPECT_FALSE(bench->reachable(1.05 * white(x, y).cast<double>(), geometry));
+        EXPECT_FALSE(bench->reachable(Xyz::Zero(), geometry)) << "darker than black and ambient";
+        ++tried;
+      }
+  }
+  EXPECT_GT(tried, 200);
+  EXPECT_FALSE(bench->reachable({1, 1, 1}, 0.0));
+}
+
+TEST(Bench, RefusesPosesThatMakeNoPicture) {
+  const auto bench = make_bench(plain_truth(), square(0.1));
+  RigidTransform broken;
+  broken.translation.x() = std::nan("");
+  EXPECT_FALSE(bench->look(broken, {0, 0, 1}));
+  EXPECT_FALSE(bench->look({}, {0, 0, 0}));
+  EXPECT_FALSE(bench->look({}, {0, std::nan(""), 1}));
+}
+
+TEST(Bench, RefusesAnObjectWithoutTriangles) { EXPECT_FALSE(Bench::create(plain_truth(), Mesh{})); }
+
+}  // namespace
+}  // namespace veneer::simulation

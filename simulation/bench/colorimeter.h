@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "base/random.h"
+#include "calibration/instruments/colorimeter.h"
+#include "calibration/profile.h"
+#include "simulation/bench.h"
+
+namespace veneer::simulation {
+
+/// The bench's projector as something that shows patches.
+class VirtualPatchDisplay final : public calibration::PatchDisplay {
+ public:
+  /// @param bench  borrowed; must outlive the display.
+  explicit VirtualPatchDisplay(const Bench& bench) : bench_(bench) {}
+  /// Errors: kInvalidOption (a code over 2^bits - 1).
+  [[nodiscard]] Status show(const std::array<std::uint16_t, 3>& code, bool lit = true) override;
+  [[nodiscard]] const std::array<std::uint16_t, 3>& code() const { return code_; }
+  [[nodiscard]] bool lit() const { return lit_; }
+
+ private:
+  const Bench& bench_;
+  std::array<std::uint16_t, 3> code_{};
+  bool lit_ = false;
+};
+
+struct VirtualColorimeterOptions {
+  /// Standard deviation of a reading, in parts of it.
+  double relative_noise = 0.001;
+  /// Standard deviation of each of X, Y, Z in the dark, cd/m^2.
+  double dark_noise_nits = 0.002;
+  std::uint64_t seed = 1;
+};
+
+/// A colorimeter on the bench that sees what the display shows. The same readings for the same
+/// seed.
+class VirtualColorimeter final : public calibration::Colorimeter {
+ public:
+  /// @param bench, display  borrowed; must outlive the colorimeter.
+  VirtualColorimeter(const Bench& bench,
+                     const VirtualPatchDisplay& display,
+                     const VirtualColorimeterOptions& options)
+      : bench_(bench), display_(display), options_(options), random_(options.seed) {}
+  [[nodiscard]] std::string description() const override { return "the bench's colorimeter"; }
+  /// Errors: kInvalidOption (a pixel off the raster).
+  [[nodiscard]] Result<Xyz> read(calibration::Target target, const Eigen::Vector2d& pixel) override;
+
+ private:
+  const Bench& bench_;
+  const VirtualPatchDisplay& display_;
+  VirtualColorimeterOptions options_;
+  Pcg32 random_;
+};
+
+/// What a perfect geometric calibration of the bench's projector would find.
+[[nodiscard]] calibration::ProjectorGeometry true_geometry(const Bench& bench);
+
+}  // namespace veneer::simulation
