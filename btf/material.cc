@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "btf/material.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+
+#include "btf/models/components.h"
+#include "btf/models/dichromatic_lpca/dichromatic_lpca.h"
+#include "btf/models/lpca/lpca.h"
+#include "btf/models/texel_colours/texel_colours.h"
+
+namespace veneer::btf {
+namespace {
+
+constexpr std::string_view kFormat = "veneer-material";
+constexpr std::string_view kVersion = "1";
+
+// One line for each model.
+constexpr std::array kModels{
+    Model{"dichromatic-lpca",
+          "shading times body colour plus specular times light colour (Obara et al. 2006)",
+          &fit_dichromatic_lpca,
+          &load_dichromatic_lpca},
+    Model{"lpca",
+          "RGB Eigen-BRDFs of texel clusters, nine-fold interpolation (Mueller et al. 2003)",
+          &fit_lpca,
+          &load_lpca},
+    Model{"texel-colours",
+          "two learned colours a texel, scalar Eigen-BRDFs four to a volume (after Schneider 2004)",
+          &fit_texel_colours,
+          &load_texel_colours},
+};
+static_assert(std::ranges::is_sorted(kModels, {}, &Model::name));
+
+Status check_range(std::string_view name, int value, int least, int most) {
+  if (value >= least && value <= most) return {};
+  return fail(Errc::kInvalidOption, "fit: {} is {}; it must be {} to {}", name, value, least, most);
+}
+
+}  // namespace
+
+Status FitOptions::check() const {
+  constexpr int kMostClusters = 256;  // a texel stores its cluster in 8 bits
+  VENEER_TRY(check_range("clusters", clusters, 1, kMostClusters));
+  VENEER_TRY(check_range("angular", angular, 4, 32));
+  VENEER_TRY(check_range("basis", basis, 0, 4096));
+  VENEER_TRY(check_range("iterations", iterations, 1, 10000));
+  VENEER_TRY(parse_components(components));
+  return {};
+}
+
+std::span<const Model> models() { return kModels; }
+
+Result<const Model*> find_model(std::string_view name) {
+  const auto found = std::ranges::find(kModels, name, &Model::name);
+  if (found != kModels.end()) return &*found;
+  std::string names;
+  for (const Model& model : kModels)
+    names += fmt::format("{}{}", names.empty() ? "" : ", ", model.name);
+  return fail(Errc::kInvalidOption, "there is no model \"{}\"; the models are {}", name, names);
+}
+
+Status save_material(const Material& material,
+                     const std::filesystem::path& path,
+                     const std::map<std::string, std::string>& provenance) {
+  const Material::Contents contents = material.contents();
+  std::map<std::string, std::string> metadata = provenance;
+  for (const auto& [key, value] : contents.metadata) metadata[key] = value;
+  metadata["format"] = kFormat;
+  metadata["version"] = kVersion;
+  metadata["model"] = material.model();
+  std::vector<TensorSpec> specs;
+  for (const auto& tensor : contents.tensors) specs.push_back(tensor.spec);
+  VENEER_ASSIGN(SafetensorsWriter writer, SafetensorsWriter::create(path, specs, metadata));
+  for (const auto& [spec, bytes] : contents.tensors) {
+    const auto copy = [&writer, &name = spec.name, source = bytes]<class T>(T) {
+      const std::span<T> target = writer.tensor<T>(name);
+      VENEER_CHECK(target.size_bytes() == source.size());
+      std::ranges::copy(source, std::as_writable_bytes(target).begin());
+    };
+    switch (spec.dtype) {
+      case DType::kU8:
+        copy(std::uint8_t{});
+        break;
+      case DType::kU16:
+        copy(std::uint16_t{});
+        break;
+      case DType::kI32:
+        copy(std::int32_t{});
+        break;
+      case DType::kF16:
+        copy(Eigen::half{});
+        break;
+      case DType::kF32:
+        copy(float{});
+        break;
+      case DType::kF64:
+        copy(double{});
+        break;
+    }
+  }
+  return writer.finish();
+}
+
+Result<std::unique_ptr<Material>> load_material(const std::filesystem::path& path) {
+  VENEER_ASSIGN(const SafetensorsFile file, SafetensorsFile::open(path));
+  const auto& metadata = file.metadata();
+  const auto format = metadata.find("format");
+  if (format == metadata.end() || format->second != kFormat)
+    return fail(Errc::kBadFormat,
+                "reading {}: it holds no Veneer material; make one with veneer fit",
+                path.string());
+  VENEER_ASSIGN(const std::string version, file.meta("version"));
+  if (version != kVersion)
+    return fail(Errc::kBadFormat,
+                "reading {}: it is a material of version {}; this program reads version {}",
+                path.string(),
+                version,
+                kVersion);
+  VENEER_ASSIGN(const std::string name, file.meta("model"));
+  const auto model = find_model(name);
+  if (!model) return fail(Errc::kBadFormat, "reading {}: {}", path.string(), model.error().what);
+  return (*model)->load(file);
+}
+
+}  // namespace veneer::btf

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "base/progress.h"
+#include "base/result.h"
+#include "base/safetensors.h"
+#include "btf/direction.h"
+#include "btf/model_shader.h"
+#include "btf/sample_set.h"
+
+namespace veneer::btf {
+
+/// How to fit a model; each model reads what it knows and refuses what it cannot do.
+struct FitOptions {
+  /// Clusters of texels. 1 to 256.
+  int clusters = 32;
+  /// Eigen-BRDFs stored and fetched per texel: "4", or "3+1" for models of two scalar terms.
+  std::string components = "4";
+  /// Which way a model puts its terms together, where it offers several; empty takes its own
+  /// choice. dichromatic-lpca: "ratio" (default) or "subtractive".
+  std::string form;
+  /// Nodes along each side of the square that directions are mapped to, for models drawn through
+  /// Schneider's elevated concentric map. 4 to 32: the volume grows with the fourth power.
+  int angular = 16;
+  /// Columns of the randomised basis in which clusters are found; 0 fits in the full space.
+  int basis = 160;
+  /// Lloyd iterations at most.
+  int iterations = 60;
+  std::uint64_t seed = 1;
+  /// Errors: kInvalidOption, naming the option and what it may be.
+  [[nodiscard]] Status check() const;
+};
+
+/// A fitted material. Immutable and thread-safe.
+class Material {
+ public:
+  virtual ~Material() = default;
+  /// The model's name in the registry.
+  [[nodiscard]] virtual std::string_view model() const = 0;
+  [[nodiscard]] virtual int width() const = 0;   ///< texels
+  [[nodiscard]] virtual int height() const = 0;  ///< texels
+  [[nodiscard]] virtual const DirectionSet& views() const = 0;
+  [[nodiscard]] virtual const DirectionSet& lights() const = 0;
+  /// What the factors alone give for one texel at every measured pair: [view][light][3], linear
+  /// RGB, not clamped. This is what the tables of the literature measure.
+  virtual void reconstruct(int texel, std::span<float> rgb) const = 0;
+  /// What the shader draws, in double precision and from the numbers that the GPU is given:
+  /// direction interpolation included, negative results cut to 0.
+  [[nodiscard]] virtual Eigen::Vector3d radiance(int texel,
+                                                 const Direction& view,
+                                                 const Direction& light) const = 0;
+  [[nodiscard]] virtual ModelShader shader() const = 0;
+  /// The factors and metadata that load() of the model reads back. The registry adds "format",
+  /// "version" and "model".
+  struct Contents {
+    struct Tensor {
+      TensorSpec spec;
+      std::span<const std::byte> bytes;  ///< borrowed from the material
+    };
+    std::vector<Tensor> tensors;
+    std::map<std::string, std::string> metadata;
+  };
+  [[nodiscard]] virtual Contents contents() const = 0;
+};
+
+/// One line of the registry.
+struct Model {
+  std::string_view name;
+  std::string_view summary;  ///< one line, with author and year
+  /// Errors: kInvalidOption (options the model cannot do with this set), kBadFormat (samples).
+  Result<std::unique_ptr<Material>> (*fit)(const SampleSet& set,
+                                           const FitOptions& options,
+                                           Progress& progress);
+  Result<std::unique_ptr<Material>> (*load)(const SafetensorsFile& file);
+};
+
+/// Every model, sorted by name.
+[[nodiscard]] std::span<const Model> models();
+/// Errors: kInvalidOption, naming the models there are.
+[[nodiscard]] Result<const Model*> find_model(std::string_view name);
+
+/// Writes a material whole or not at all. `fitted_on` and the options go into its metadata.
+[[nodiscard]] Status save_material(const Material& material,
+                                   const std::filesystem::path& path,
+                                   const std::map<std::string, std::string>& provenance);
+/// Errors: kNotFound, kBadFormat (no Veneer material, newer version, unknown model, damaged).
+[[nodiscard]] Result<std::unique_ptr<Material>> load_material(const std::filesystem::path& path);
+
+}  // namespace veneer::btf

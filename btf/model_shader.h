@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace veneer::btf {
+
+/// How a texture that a model's shader reads is laid out; the names are OpenGL's.
+enum class TextureKind { k2D, k2DArray, k3D };
+enum class TexelFormat { kR8ui, kR16ui, kRgba16ui, kRgba32ui, kR16f, kRg16f, kRgba16f, kRgba32f };
+[[nodiscard]] std::size_t bytes_per_texel(TexelFormat format);
+
+struct ModelTexture {
+  std::string sampler;  ///< the uniform's name in the shader
+  TextureKind kind = TextureKind::k2D;
+  TexelFormat format = TexelFormat::kRgba16f;
+  int width = 1;
+  int height = 1;
+  int depth = 1;  ///< layers of an array, slices of a volume
+  bool linear =
+      false;  ///< filtered between texels (never for integer formats); clamped to the edge
+  std::vector<std::byte> data = {};  ///< x fastest, then y, then depth
+};
+
+/// The bytes of a texture's values.
+template <class T>
+[[nodiscard]] std::vector<std::byte> texture_data(const std::vector<T>& values) {
+  const auto bytes = std::as_bytes(std::span(values));
+  return {bytes.begin(), bytes.end()};
+}
+
+/// What the renderer needs to draw a material: GLSL that defines
+/// `vec3 btf_radiance(vec2 uv, vec3 view, vec3 light)` in the sample's unit, and its textures.
+/// `uv` is in repeats of the sample (uv.x = 1 is one width to the right), `view` and `light` are
+/// unit vectors in the local frame; view.z may be slightly below 0 at silhouettes.
+struct ModelShader {
+  std::string source;  ///< constants first, no #version
+  std::vector<ModelTexture> textures;
+  int fetches = 0;  ///< texture fetches for one call
+  [[nodiscard]] std::size_t gpu_bytes() const;
+};
+
+}  // namespace veneer::btf

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "btf/models/components.h"
+
+#include <algorithm>
+#include <charconv>
+
+namespace veneer::btf {
+
+Result<std::vector<int>> parse_components(std::string_view text) {
+  std::vector<int> components;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find('+', begin), text.size());
+    int value = 0;
+    const auto [stop, error] = std::from_chars(text.data() + begin, text.data() + end, value);
+    if (error != std::errc{} || stop != text.data() + end || value < 1 || value > kMostComponents)
+      return fail(
+          Errc::kInvalidOption,
+          "fit: components is \"{}\"; it must be one number for each term of the model, joined "
+          "by +, each 1 to {}: for instance 4 or 3+1",
+          text,
+          kMostComponents);
+    components.push_back(value);
+    begin = end + 1;
+  }
+  return components;
+}
+
+Result<int> parse_one_term(std::string_view text, std::string_view model) {
+  VENEER_ASSIGN(const std::vector<int> components, parse_components(text));
+  if (components.size() == 1) return components.front();
+  return fail(Errc::kInvalidOption,
+              "fit: components is \"{}\"; {} takes one number, for instance 4",
+              text,
+              model);
+}
+
+Result<std::array<int, 2>> parse_two_terms(std::string_view text, std::string_view model) {
+  VENEER_ASSIGN(const std::vector<int> components, parse_components(text));
+  if (components.size() == 2) return std::array{components[0], components[1]};
+  if (components.size() == 1 && components.front() >= 2) {
+    const int second = std::max(1, components.front() / 4);
+    return std::array{components.front() - second, second};
+  }
+  return fail(Errc::kInvalidOption,
+              "fit: components is \"{}\"; {} takes two numbers, for instance 3+1, or their sum",
+              text,
+              model);
+}
+
+Status refuse_form(const FitOptions& options, std::string_view model) {
+  if (options.form.empty()) return {};
+  return fail(Errc::kInvalidOption,
+              "fit: form is \"{}\"; {} has only one form, leave it out",
+              options.form,
+              model);
+}
+
+std::string format_components(const std::array<int, 2>& components) {
+  return fmt::format("{}+{}", components[0], components[1]);
+}
+
+}  // namespace veneer::btf

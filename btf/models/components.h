@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.h"
+#include "btf/material.h"
+
+namespace veneer::btf {
+
+/// Most Eigen-BRDFs of one term.
+inline constexpr int kMostComponents = 16;
+
+/// Reads "4" or "3+1": one number for each term, each 1 to kMostComponents.
+/// Errors: kInvalidOption, saying what is expected.
+[[nodiscard]] Result<std::vector<int>> parse_components(std::string_view text);
+
+/// The number for a model of one term. Errors: kInvalidOption.
+[[nodiscard]] Result<int> parse_one_term(std::string_view text, std::string_view model);
+
+/// The numbers for a model of two terms. A single number n >= 2 is split three to one, as suits
+/// most materials: "4" is "3+1", "8" is "6+2". Errors: kInvalidOption.
+[[nodiscard]] Result<std::array<int, 2>> parse_two_terms(std::string_view text,
+                                                         std::string_view model);
+
+/// For models of one form. Errors: kInvalidOption where the options ask for another.
+[[nodiscard]] Status refuse_form(const FitOptions& options, std::string_view model);
+
+/// "3+1" again.
+[[nodiscard]] std::string format_components(const std::array<int, 2>& components);
+
+}  // namespace veneer::btf

@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "btf/models/dichromatic_lpca/dichromatic_lpca.h"
+
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <mutex>
+
+#include "base/parallel.h"
+#include "btf/models/components.h"
+#include "btf/models/packed_lpca.h"
+
+namespace veneer::btf {
+namespace {
+
+constexpr std::string_view kName = "dichromatic-lpca";
+constexpr std::string_view kRatio = "ratio";
+constexpr std::string_view kSubtractive = "subtractive";
+
+// |D_ref| under this is noise: a thousandth of a white diffuser, the black noise of 12-bit capture.
+constexpr float kNoise = 1e-3F;
+// Keeps the fade defined for lights measured down to the horizon.
+constexpr double kLeastCosine = 1e-6;
+
+constexpr char kGlsl[] =
+#include "btf/models/dichromatic_lpca/dichromatic_lpca.glsl.inc"
+    ;
+
+using Samples = Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>>;
+using Half3 = Eigen::Matrix<Eigen::half, 3, 1>;
+
+// Everything that is the same for all texels.
+struct Terms {
+  bool subtractive = false;
+  Eigen::Vector3f specular_colour = Eigen::Vector3f::UnitX();
+  Eigen::Vector3f shade_colour =
+      Eigen::Vector3f::UnitX();  // of what shadows take away; subtractive
+  int masked_texels = 0;
+};
+
+bool lower(const Direction& a, const Direction& b) { return a.z() < b.z(); }
+
+int nearest_normal(const DirectionSet& directions) {
+  return static_cast<int>(std::ranges::max_element(directions, lower) - directions.begin());
+}
+
+// The colour that explains most of the energy; grey where there is none.
+Eigen::Vector3f best_colour(const Eigen::Matrix3d& gram) {
+  if (!(gram.trace() > 0.0)) return Eigen::Vector3f::Constant(1.0F / std::sqrt(3.0F));
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(gram);
+  const Eigen::Vector3d colour = solver.eigenvectors().col(2);
+  return (colour.sum() < 0.0 ? -colour : colour).cast<float>();
+}
+
+Eigen::Vector3f colour_at(const std::vector<Eigen::half>& colours, int texel) {
+  return Eigen::Map<const Half3>(colours.data() + 3 * texel).cast<float>();
+}
+
+class Dichromatic final : public Material {
+ public:
+  /// @param reference  D_ref, [texel][3]
+  Dichromatic(PackedLpca scalars, Terms terms, std::vector<Eigen::half> reference)
+      : scalars_(std::move(scalars)), terms_(terms), reference_(std::move(reference)) {
+    border_cosine_ = std::max(std::ranges::min_element(lights(), lower)->z(), kLeastCosine);
+    colours_ = reference_;
+    for (int i = 0; i < scalars_.frame().texel_count() && !terms_.subtractive; ++i)
+      Eigen::Map<Half3>(colours_.data() + 3 * i) =
+          body_colour(colour_at(reference_, i)).cast<Eigen::half>();
+  }
+
+  /// The direction of D_ref in RGB; zero where it is under the noise.
+  static Eigen::Vector3f body_colour(const Eigen::Vector3f& reference) {
+    const float norm = reference.norm();
+    return norm < kNoise ? Eigen::Vector3f::Zero() : Eigen::Vector3f(reference / norm);
+  }
+
+  std::string_view model() const override { return kName; }
+  int width() const override { return scalars_.frame().width; }
+  int height() const override { return scalars_.frame().height; }
+  const DirectionSet& views() const override { return scalars_.frame().views; }
+  const DirectionSet& lights() const override { return scalars_.frame().lights; }
+
+  void reconstruct(int texel, std::span<float> rgb) const override {
+    const auto pairs = static_cast<std::size_t>(scalars_.frame().pair_count());
+    std::vector<float> functions(2 * pairs);
+    scalars_.reconstruct(
+        texel, std::span(functions).first(pairs), std::span(functions).last(pairs));
+    for (std::size_t i = 0; i < pairs; ++i)
+      Eigen::Map<Eigen::Vector3f>(rgb.data() + 3 * i) =
+          combine(texel, {functions[i], functions[pairs + i]}).cast<float>();
+  }
+
+  Eigen::Vector3d radiance(int texel,
+                           const Direction& view,
+                           const Direction& light) const override {
+    if (!(light.z() > 0.0)) return Eigen::Vector3d::Zero();
+    const double fade = terms_.subtractive ? std::min(1.0, light.z() / border_cosine_) : 1.0;
+    return (fade * combine(texel, scalars_.evaluate(texel, view, light))).cwiseMax(0.0);
+  }
+
+  ModelShader shader() const override {
+    ModelShader shader = scalars_.shader({1, colours_});
+    const auto vec3 = [](const Eigen::Vector3f& v) {
+      return fmt::format("vec3({:.9g}, {:.9g}, {:.9g})", v[0], v[1], v[2]);
+    };
+    shader.source += fmt::format(
+        "const bool kSubtractive = {};\nconst float kBorderCosine = {:.9g};\n"
+        "const vec3 kSpecularColour = {};\nconst vec3 kShadeColour = {};\n",
+        terms_.subtractive,
+        border_cosine_,
+        vec3(terms_.specular_colour),
+        vec3(terms_.shade_colour));
+    shader.source += kGlsl;
+    return shader;
+  }
+
+  Contents contents() const override {
+    Contents contents;
+    scalars_.add_to(contents);
+    contents.metadata["form"] = terms_.subtractive ? kSubtractive : kRatio;
+    contents.metadata["masked_texels"] = fmt::format("{}", terms_.masked_texels);
+    contents.tensors.push_back(
+        tensor_of("diffuse_reference", {scalars_.frame().texel_count(), 3}, reference_));
+    for (const auto& [name, colour] : {std::pair{"specular_colour", &terms_.specular_colour},
+                                       std::pair{"shade_colour", &terms_.shade_colour}})
+      contents.tensors.push_back(
+          {{name, DType::kF32, {3}}, std::as_bytes(std::span(colour->data(), 3))});
+    return contents;
+  }
+
+ private:
+  Eigen::Vector3d combine(int texel, const Eigen::Vector2d& scalars) const {
+    const Eigen::Vector3d colour = colour_at(colours_, texel).cast<double>();
+    const Eigen::Vector3d specular = scalars[1] * terms_.specular_colour.cast<double>();
+    if (terms_.subtractive)
+      return colour - scalars[0] * terms_.shade_colour.cast<double>() + specular;
+    return scalars[0] * colour + specular;
+  }
+
+  PackedLpca scalars_;
+  Terms terms_;
+  std::vector<Eigen::half> reference_;
+  std::vector<Eigen::half> colours_;  // what the shader multiplies or starts from, [texel][3]
+  double border_cosine_ = 0.0;        // of the lowest light
+};
+
+DirectionRole beyond(const Terms& terms) {
+  return terms.subtractive ? DirectionRole::kView : DirectionRole::kLight;
+}
+
+// Looks at all samples once: the reference, the colours and how many texels are masked.
+Terms find_terms(const SampleSet& set,
+                 bool subtractive,
+                 std::vector<Eigen::half>& reference,
+                 Progress& progress) {
+  const SampleSetInfo& info = set.info();
+  const int reference_pair = nearest_normal(info.views) * static_cast<int>(info.lights.size()) +
+                             nearest_normal(info.lights);
+  const auto pairs = static_cast<Eigen::Index>(info.pair_count());
+  reference.resize(static_cast<std::size_t>(info.texel_count()) * 3);
+  // One texel's share at a place of its own, so that the sum has one order whatever the threads do.
+  std::vector<Eigen::Matrix3d> specular(static_cast<std::size_t>(info.texel_count()));
+  std::vector<Eigen::Matrix3d> shade(specular.size());
+  progress.start("colours", info.texel_count());
+  parallel_for(info.texel_count(), 16, [&](std::int64_t begin, std::int64_t end) {
+    std::vector<float> rgb(static_cast<std::size_t>(pairs) * 3);
+    const Samples samples(rgb.data(), pairs, 3);
+    for (auto texel = static_cast<int>(begin); texel < end; ++texel) {
+      const auto index = static_cast<std::size_t>(texel);
+      set.rgb(texel, Part::kDiffuse, rgb);
+      const Eigen::RowVector3f here = samples.row(reference_pair);
+      Eigen::Map<Half3>(reference.data() + 3 * texel) = here.transpose().cast<Eigen::half>();
+      const Eigen::MatrixX3d taken = (samples.rowwise() - here).cast<double>();
+      shade[index] = taken.transpose() * taken;
+      set.rgb(texel, Part::kSpecular, rgb);
+      const Eigen::MatrixX3d shine = samples.cast<double>();
+      specular[index] = shine.transpose() * shine;
+    }
+    progress.advance(end - begin);
+  });
+  Terms terms;
+  terms.subtractive = subtractive;
+  Eigen::Matrix3d specular_sum = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d shade_sum = Eigen::Matrix3d::Zero();
+  for (int i = 0; i < info.texel_count(); ++i) {
+    specular_sum += specular[static_cast<std::size_t>(i)];
+    shade_sum += shade[static_cast<std::size_t>(i)];
+    if (colour_at(reference, i).norm() < kNoise) ++terms.masked_texels;
+  }
+  terms.specular_colour = best_colour(specular_sum);
+  terms.shade_colour = best_colour(shade_sum);
+  progress.finish(terms.masked_texels == 0
+                      ? std::string()
+                      : fmt::format("{} texels too dark", terms.masked_texels));
+  return terms;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Material>> fit_dichromatic_lpca(const SampleSet& set,
+                                                       const FitOptions& options,
+                                                       Progress& progress) {
+  VENEER_TRY(options.check());
+  VENEER_ASSIGN(const PackedLpca::Components components,
+                parse_two_terms(options.components, kName));
+  if (!options.form.empty() && options.form != kRatio && options.form != kSubtractive)
+    return fail(Errc::kInvalidOption,
+                "fit: form is \"{}\"; {} knows {} and {}",
+                options.form,
+                kName,
+                kRatio,
+                kSubtractive);
+  if (!set.info().polarised)
+    return fail(
+        Errc::kInvalidOption,
+        "fit: {} has no specular and diffuse parts, which {} needs; fit texel-colours to it, or "
+        "capture the sample with polarisers",
+        set.path().string(),
+        kName);
+  VENEER_TRY(set.check_finite());
+
+  std::vector<Eigen::half> reference;
+  const Terms terms = find_terms(set, options.form == kSubtractive, reference, progress);
+  const MaterialFrame frame = frame_of(set.info());
+  const auto read = [&](int texel, std::span<float> shading, std::span<float> specular) {
+    std::vector<float> rgb(3 * shading.size());
+    const Samples samples(rgb.data(), frame.pair_count(), 3);
+    Eigen::Map<Eigen::VectorXf> first(shading.data(), samples.rows());
+    const Eigen::Vector3f here = colour_at(reference, texel);
+    set.rgb(texel, Part::kDiffuse, rgb);
+    if (terms.subtractive)
+      first = (here.dot(terms.shade_colour) - (samples * terms.shade_colour).array()).matrix();
+    else
+      first = samples * Dichromatic::body_colour(here);
+    set.rgb(texel, Part::kSpecular, rgb);
+    Eigen::Map<Eigen::VectorXf>(specular.data(), samples.rows()) = samples * terms.specular_colour;
+  };
+  VENEER_ASSIGN(PackedLpca scalars,
+                PackedLpca::fit(
+                    frame,
+                    options,
+                    {.components = components, .angular = options.angular, .beyond = beyond(terms)},
+                    read,
+                    progress));
+  return std::make_unique<Dichromatic>(std::move(scalars), terms, std::move(reference));
+}
+
+Result<std::unique_ptr<Material>> load_dichromatic_lpca(const SafetensorsFile& file) {
+  Terms terms;
+  VENEER_ASSIGN(const std::string form, file.meta("form"));
+  if (form != kRatio && form != kSubtractive)
+    return fail(Errc::kBadFormat,
+                "reading {}: form is \"{}\"; this program knows {} and {}",
+                file.path().string(),
+                form,
+                kRatio,
+                kSubtractive);
+  terms.subtractive = form == kSubtractive;
+  VENEER_ASSIGN(PackedLpca scalars, PackedLpca::load(file, beyond(terms)));
+  const int texels = scalars.frame().texel_count();
+  VENEER_ASSIGN(terms.masked_texels, read_integer(file, "masked_texels", 0, texels));
+  for (const auto& [name, colour] : {std::pair{"specular_colour", &terms.specular_colour},
+                                     std::pair{"shade_colour", &terms.shade_colour}}) {
+    VENEER_ASSIGN(const TensorView tensor, file.tensor(name, DType::kF32, {3}));
+    *colour = Eigen::Map<const Eigen::Vector3f>(tensor.as<float>().data());
+    if (!colour->allFinite())
+      return fail(Errc::kBadFormat, "reading {}: {} is not finite", file.path().string(), name);
+  }
+  VENEER_ASSIGN(std::vector<Eigen::half> reference,
+                read_halves(file, "diffuse_reference", {texels, 3}));
+  return std::make_unique<Dichromatic>(std::move(scalars), terms, std::move(reference));
+}
+
+}  // namespace veneer::btf

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "btf/models/lpca/lpca.h"
+
+#include <algorithm>
+
+#include "btf/models/components.h"
+#include "btf/models/direction_lookup.h"
+#include "btf/models/lpca_factors.h"
+
+namespace veneer::btf {
+namespace {
+
+constexpr std::string_view kName = "lpca";
+constexpr int kWeightsPerTexel = 4;  // of an RGBA texture
+
+constexpr char kElevatedConcentricGlsl[] =
+#include "btf/models/elevated_concentric.glsl.inc"
+    ;
+constexpr char kDirectionLookupGlsl[] =
+#include "btf/models/direction_lookup.glsl.inc"
+    ;
+constexpr char kGlsl[] =
+#include "btf/models/lpca/lpca.glsl.inc"
+    ;
+
+class Lpca final : public Material {
+ public:
+  Lpca(MaterialFrame frame, LpcaFactors factors)
+      : frame_(std::move(frame)),
+        factors_(std::move(factors)),
+        views_(frame_.views, DirectionRole::kView),
+        lights_(frame_.lights, DirectionRole::kLight) {}
+
+  std::string_view model() const override { return kName; }
+  int width() const override { return frame_.width; }
+  int height() const override { return frame_.height; }
+  const DirectionSet& views() const override { return frame_.views; }
+  const DirectionSet& lights() const override { return frame_.lights; }
+
+  void reconstruct(int texel, std::span<float> rgb) const override {
+    factors_.reconstruct(texel, 0, factors_.components, rgb);
+  }
+
+  Eigen::Vector3d radiance(int texel,
+                           const Direction& view,
+                           const Direction& light) const override {
+    if (!(light.z() > 0.0)) return Eigen::Vector3d::Zero();
+    const Direction above(view.x(), view.y(), std::max(view.z(), 0.0));
+    const DirectionWeights v = views_.weights(above);
+    const DirectionWeights l = lights_.weights(light);
+    const std::span<const Eigen::half> weight = factors_.weights_of(texel);
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (int c = 0; c < factors_.components; ++c) {
+      const auto brdf = factors_.eigen_brdf(factors_.cluster[static_cast<std::size_t>(texel)], c);
+      for (std::size_t i = 0; i < 3; ++i)
+        for (std::size_t j = 0; j < 3; ++j) {
+          const auto pair = static_cast<std::size_t>(v.index[i]) * frame_.lights.size() +
+                            static_cast<std::size_t>(l.index[j]);
+          sum += static_cast<double>(weight[static_cast<std::size_t>(c)]) * v.weight[i] *
+                 l.weight[j] *
+                 Eigen::Map<const Eigen::Matrix<Eigen::half, 3, 1>>(&brdf[3 * pair]).cast<double>();
+        }
+    }
+    return (l.scale * sum).cwiseMax(0.0);
+  }
+
+  ModelShader shader() const override;
+
+  Contents contents() const override {
+    Contents contents;
+    add_frame(frame_, contents);
+    contents.metadata["components"] = fmt::format("{}", factors_.components);
+    add_factors(factors_, frame_.texel_count(), contents);
+    return contents;
+  }
+
+ private:
+  MaterialFrame frame_;
+  LpcaFactors factors_;
+  DirectionLookup views_;
+  DirectionLookup lights_;
+};
+
+ModelShader Lpca::shader() const {
+  const int components = factors_.components;
+  const int layers = (components + kWeightsPerTexel - 1) / kWeightsPerTexel;
+  ModelShader shader;
+  shader.source = fmt::format(
+      "const ivec2 kTexels = ivec2({}, {});\nconst int kComponents = {};\nconst int kViews = {};\n",
+      frame_.width,
+      frame_.height,
+      components,
+      frame_.views.size());
+  shader.source += kElevatedConcentricGlsl;
+  shader.source += kDirectionLookupGlsl;
+  shader.source += kGlsl;
+
+  ModelTexture clusters{.sampler = "Clusters",
+                        .format = TexelFormat::kR8ui,
+                        .width = frame_.width,
+                        .height = frame_.height};
+  clusters.data = texture_data(factors_.cluster);
+  shader.textures.push_back(std::move(clusters));
+
+  ModelTexture weights{.sampler = "Weights",
+                       .kind = TextureKind::k2DArray,
+                       .format = TexelFormat::kRgba16f,
+                       .width = frame_.width,
+                       .height = frame_.height,
+                       .depth = layers};
+  std::vector<Eigen::half> padded(
+      static_cast<std::size_t>(frame_.texel_count() * layers * kWeightsPerTexel));
+  for (int texel = 0; texel < frame_.texel_count(); ++texel)
+    for (int c = 0; c < components; ++c)
+      padded[static_cast<std::size_t>(
+          ((c / kWeightsPerTexel) * frame_.texel_count() + texel) * kWeightsPerTexel +
+          c % kWeightsPerTexel)] = factors_.weights_of(texel)[static_cast<std::size_t>(c)];
+  weights.data = texture_data(padded);
+  shader.textures.push_back(std::move(weights));
+
+  // A layer for each cluster; in it a row for each (component, view), a column for each light.
+  ModelTexture brdfs{.sampler = "EigenBrdfs",
+                     .kind = TextureKind::k2DArray,
+                     .format = TexelFormat::kRgba16f,
+                     .width = static_cast<int>(frame_.lights.size()),
+                     .height = components * static_cast<int>(frame_.views.size()),
+                     .depth = factors_.clusters};
+  std::vector<Eigen::half> rgba;
+  rgba.reserve(factors_.eigen_brdfs.size() / 3 * 4);
+  for (std::size_t i = 0; i < factors_.eigen_brdfs.size(); i += 3) {
+    rgba.insert(rgba.end(),
+                {factors_.eigen_brdfs[i],
+                 factors_.eigen_brdfs[i + 1],
+                 factors_.eigen_brdfs[i + 2],
+                 Eigen::half(0.0F)});
+  }
+  brdfs.data = texture_data(rgba);
+  shader.textures.push_back(std::move(brdfs));
+
+  views_.add_textures("View", shader.textures);
+  lights_.add_textures("Light", shader.textures);
+  shader.fetches = 1 + layers + 2 * DirectionLookup::kFetches + 9 * components;
+  return shader;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Material>> fit_lpca(const SampleSet& set,
+                                           const FitOptions& options,
+                                           Progress& progress) {
+  VENEER_TRY(options.check());
+  VENEER_TRY(refuse_form(options, kName));
+  VENEER_ASSIGN(const int components, parse_one_term(options.components, kName));
+  VENEER_TRY(set.check_finite());
+  MaterialFrame frame = frame_of(set.info());
+  RowSource source;
+  source.rows = frame.texel_count();
+  source.part_columns = {frame.pair_count() * 3};
+  source.read = [&set](int texel, std::span<float> rgb) { set.rgb(texel, Part::kTotal, rgb); };
+  const LocalPca pca = fit_local_pca(source,
+                                     {.clusters = options.clusters,
+                                      .components = {components},
+                                      .basis = options.basis,
+                                      .iterations = options.iterations,
+                                      .seed = options.seed},
+                                     progress);
+  return std::make_unique<Lpca>(std::move(frame), factors_of(pca));
+}
+
+Result<std::unique_ptr<Material>> load_lpca(const SafetensorsFile& file) {
+  VENEER_ASSIGN(MaterialFrame frame, read_frame(file));
+  VENEER_ASSIGN(const int components, read_integer(file, "components", 1, kMostComponents));
+  VENEER_ASSIGN(LpcaFactors factors,
+                read_factors(file, frame.texel_count(), components, 3 * frame.pair_count()));
+  return std::make_unique<Lpca>(std::move(frame), std::move(factors));
+}
+
+}  // namespace veneer::btf

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "btf/models/local_pca.h"
+#include "btf/models/material_tensors.h"
+
+namespace veneer::btf {
+
+/// The factors of a clustered model as they are stored and drawn: float16, each Eigen-BRDF scaled
+/// so that its largest magnitude is 1, the inverse scale folded into the weights.
+struct LpcaFactors {
+  int clusters = 0;
+  int components = 0;                    ///< of all terms
+  int columns = 0;                       ///< values of one Eigen-BRDF
+  std::vector<std::uint8_t> cluster;     ///< [texel]
+  std::vector<Eigen::half> weights;      ///< [texel][component]
+  std::vector<Eigen::half> eigen_brdfs;  ///< [cluster][component][column]
+
+  [[nodiscard]] std::span<const Eigen::half> weights_of(int texel) const;
+  [[nodiscard]] std::span<const Eigen::half> eigen_brdf(int in_cluster, int component) const;
+  /// The sum of the components [first, first + count) of a texel at every column.
+  void reconstruct(int texel, int first, int count, std::span<float> values) const;
+};
+
+/// @param pca  all parts with the same number of columns.
+[[nodiscard]] LpcaFactors factors_of(const LocalPca& pca);
+
+/// Adds the tensors "clusters", "weights", "eigen_brdfs" to a material's contents.
+void add_factors(const LpcaFactors& factors, int texels, Material::Contents& contents);
+/// Reads them back. Errors: kBadFormat (shapes that do not fit, values that are not finite, a
+/// cluster that is not there).
+[[nodiscard]] Result<LpcaFactors> read_factors(const SafetensorsFile& file,
+                                               int texels,
+                                               int components,
+                                               int columns);
+
+}  // namespace veneer::btf

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "btf/models/material_tensors.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+namespace veneer::btf {
+namespace {
+
+// More texels a side than GL promises to take in one texture.
+constexpr int kMostTexels = 16384;
+
+Result<DirectionSet> read_directions_of(const SafetensorsFile& file, const std::string& name) {
+  VENEER_ASSIGN(const TensorView tensor, file.tensor(name, DType::kF64, {-1, 3}));
+  const std::span<const double> values = tensor.as<double>();
+  DirectionSet directions;
+  for (std::size_t i = 0; i + 3 <= values.size(); i += 3) {
+    const Direction direction(values[i], values[i + 1], values[i + 2]);
+    constexpr double kUnitTolerance = 1e-6;  // directions were written from unit vectors in double
+    if (!(std::abs(direction.squaredNorm() - 1.0) < kUnitTolerance))
+      return fail(Errc::kBadFormat,
+                  "reading {}: {}: direction {} is no unit vector",
+                  file.path().string(),
+                  name,
+                  i / 3);
+    directions.push_back(direction);
+  }
+  if (directions.empty())
+    return fail(Errc::kBadFormat, "reading {}: {} holds no direction", file.path().string(), name);
+  return directions;
+}
+
+Material::Contents::Tensor directions_tensor(const std::string& name,
+                                             const DirectionSet& directions) {
+  return {{name, DType::kF64, {static_cast<std::int64_t>(directions.size()), 3}},
+          std::as_bytes(std::span(directions))};
+}
+
+}  // namespace
+
+MaterialFrame frame_of(const SampleSetInfo& info) {
+  return {info.width, info.height, info.views, info.lights};
+}
+
+void add_frame(const MaterialFrame& frame, Material::Contents& contents) {
+  contents.metadata["width"] = fmt::format("{}", frame.width);
+  contents.metadata["height"] = fmt::format("{}", frame.height);
+  contents.tensors.push_back(directions_tensor("views", frame.views));
+  contents.tensors.push_back(directions_tensor("lights", frame.lights));
+}
+
+Result<MaterialFrame> read_frame(const SafetensorsFile& file) {
+  MaterialFrame frame;
+  VENEER_ASSIGN(frame.width, read_integer(file, "width", 1, kMostTexels));
+  VENEER_ASSIGN(frame.height, read_integer(file, "height", 1, kMostTexels));
+  VENEER_ASSIGN(frame.views, read_directions_of(file, "views"));
+  VENEER_ASSIGN(frame.lights, read_directions_of(file, "lights"));
+  return frame;
+}
+
+Result<int> read_integer(const SafetensorsFile& file, const std::string& key, int least, int most) {
+  VENEER_ASSIGN(const std::string text, file.meta(key));
+  int value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size() || value < least || value > most)
+    return fail(Errc::kBadFormat,
+                "reading {}: {} is \"{}\"; it should be {} to {}",
+                file.path().string(),
+                key,
+                text,
+                least,
+                most);
+  return value;
+}
+
+Result<std::vector<Eigen::half>> read_halves(const SafetensorsFile& file,
+                                             const std::string& name,
+                                             const std::vector<std::int64_t>& shape) {
+  VENEER_ASSIGN(const TensorView tensor, file.tensor(name, DType::kF16, shape));
+  const std::span<const Eigen::half> values = tensor.as<Eigen::half>();
+  const auto bad =
+      std::ranges::find_if_not(values, [](Eigen::half h) { return Eigen::numext::isfinite(h); });
+  if (bad != values.end())
+    return fail(Errc::kBadFormat,
+                "reading {}: {}: element {} is not finite",
+                file.path().string(),
+                name,
+                bad - values.begin());
+  return std::vector<Eigen::half>(values.begin(), values.end());
+}
+
+Result<std::vector<std::uint8_t>> read_clusters(const SafetensorsFile& file,
+                                                int texels,
+                                                int clusters) {
+  VENEER_ASSIGN(const TensorView tensor, file.tensor("clusters", DType::kU8, {texels}));
+  const std::span<const std::uint8_t> values = tensor.as<std::uint8_t>();
+  const auto bad =
+      std::ranges::find_if(values, [clusters](std::uint8_t k) { return k >= clusters; });
+  if (bad != values.end())
+    return fail(Errc::kBadFormat,
+                "reading {}: texel {} is in cluster {} of {}",
+                file.path().string(),
+                bad - values.begin(),
+                *bad,
+                clusters);
+  return std::vector<std::uint8_t>(values.begin(), values.end());
+}
+
+Eigen::half saturated_half(float value) {
+  constexpr float kLargest = 65504.0F;
+  return Eigen::half(std::clamp(value, -kLargest, kLargest));
+}
+
+}  // namespace veneer::btf

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+#include <vector>
+
+#include "btf/material.h"
+
+namespace veneer::btf {
+
+/// What every material knows of the set it was fitted on.
+struct MaterialFrame {
+  int width = 0;   ///< texels
+  int height = 0;  ///< texels
+  DirectionSet views;
+  DirectionSet lights;
+
+  [[nodiscard]] int texel_count() const { return width * height; }
+  [[nodiscard]] int pair_count() const { return static_cast<int>(views.size() * lights.size()); }
+};
+[[nodiscard]] MaterialFrame frame_of(const SampleSetInfo& info);
+
+/// Adds the frame to a material's contents: metadata "width", "height", tensors "views", "lights".
+void add_frame(const MaterialFrame& frame, Material::Contents& contents);
+/// Reads it back. Errors: kBadFormat (missing, sizes out of range, directions that are not unit).
+[[nodiscard]] Result<MaterialFrame> read_frame(const SafetensorsFile& file);
+
+/// A metadata entry that is an integer in [least, most]. Errors: kBadFormat.
+[[nodiscard]] Result<int> read_integer(const SafetensorsFile& file,
+                                       const std::string& key,
+                                       int least,
+                                       int most);
+/// A float16 tensor with finite elements. Errors: kBadFormat.
+[[nodiscard]] Result<std::vector<Eigen::half>> read_halves(const SafetensorsFile& file,
+                                                           const std::string& name,
+                                                           const std::vector<std::int64_t>& shape);
+/// The cluster of every texel, each < clusters. Errors: kBadFormat.
+[[nodiscard]] Result<std::vector<std::uint8_t>> read_clusters(const SafetensorsFile& file,
+                                                              int texels,
+                                                              int clusters);
+
+/// A tensor that borrows `values`.
+template <class T>
+[[nodiscard]] Material::Contents::Tensor tensor_of(std::string name,
+                                                   std::vector<std::int64_t> shape,
+                                                   const std::vector<T>& values) {
+  return {{std::move(name), DTypeOf<T>::kValue, std::move(shape)},
+          std::as_bytes(std::span(values))};
+}
+
+/// Float16 of a value; beyond its range the largest that there is.
+[[nodiscard]] Eigen::half saturated_half(float value);
+
+}  // namespace veneer::btf

@@ -1,0 +1,303 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "btf/models/packed_lpca.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "base/parallel.h"
+#include "btf/models/components.h"
+
+namespace veneer::btf {
+namespace {
+
+// Every GL 4.5 takes volumes of this many texels a side.
+constexpr int kMostVolumeSide = 2048;
+constexpr int kScalarsPerVolume = 4;
+// 16-bit lanes of one RGBA32UI texel.
+constexpr int kLanesPerWord = 8;
+
+constexpr char kElevatedConcentricGlsl[] =
+#include "btf/models/elevated_concentric.glsl.inc"
+    ;
+constexpr char kPackedLpcaGlsl[] =
+#include "btf/models/packed_lpca.glsl.inc"
+    ;
+
+int volumes_for(const PackedLpca::Components& components) {
+  return (components[0] + components[1] + kScalarsPerVolume - 1) / kScalarsPerVolume;
+}
+
+// As the constructor will lay them out, without the padding of clusters to whole rows.
+double volume_bytes(const MaterialFrame& frame, const PackedLpca::Layout& layout, int clusters) {
+  const double nodes = layout.angular * layout.angular;
+  const double view_nodes = frame.views.size() == 1 ? 1.0 : nodes;
+  return view_nodes * nodes * clusters * volumes_for(layout.components) *
+         static_cast<double>(bytes_per_texel(TexelFormat::kRgba16f));
+}
+
+// Lanes 0, 1 are the low and high half of the first uint, and so on.
+std::string lane(int index) {
+  constexpr std::string_view kNames = "xyzw";
+  return fmt::format("unpackHalf2x16(word{}.{}).{}",
+                     index / kLanesPerWord,
+                     kNames[static_cast<std::size_t>(index % kLanesPerWord / 2)],
+                     kNames[static_cast<std::size_t>(index % 2)]);
+}
+
+}  // namespace
+
+Result<PackedLpca> PackedLpca::fit(const MaterialFrame& frame,
+                                   const FitOptions& options,
+                                   const Layout& layout,
+                                   const Read& read,
+                                   Progress& progress) {
+  const double bytes = volume_bytes(frame, layout, std::min(options.clusters, frame.texel_count()));
+  if (bytes > double(kMostVolumeBytes))
+    return fail(Errc::kInvalidOption,
+                "fit: the volumes would take {:.1f} GiB on the GPU, over {:.0f} GiB; choose fewer "
+                "clusters, fewer components or a smaller angular",
+                bytes / (1U << 30U),
+                double(kMostVolumeBytes) / (1U << 30U));
+  const int pairs = frame.pair_count();
+  RowSource source;
+  source.rows = frame.texel_count();
+  source.part_columns = {pairs, pairs};
+  source.read = [&read, pairs](int texel, std::span<float> values) {
+    const auto count = static_cast<std::size_t>(pairs);
+    read(texel, values.first(count), values.last(count));
+  };
+  const LocalPca pca = fit_local_pca(source,
+                                     {.clusters = options.clusters,
+                                      .components = {layout.components[0], layout.components[1]},
+                                      .basis = options.basis,
+                                      .iterations = options.iterations,
+                                      .seed = options.seed},
+                                     progress);
+  return PackedLpca(frame, layout, factors_of(pca));
+}
+
+PackedLpca::PackedLpca(MaterialFrame frame, Layout layout, LpcaFactors factors)
+    : frame_(std::move(frame)),
+      layout_(layout),
+      factors_(std::move(factors)),
+      views_(frame_.views, DirectionRole::kView, layout.angular),
+      lights_(frame_.lights, layout.beyond, layout.angular) {
+  fill_volumes();
+}
+
+int PackedLpca::volume_count() const { return volumes_for(layout_.components); }
+
+void PackedLpca::fill_volumes() {
+  const int a = views_.nodes();
+  const int b = lights_.nodes();
+  while ((1 << cluster_shift_) < factors_.clusters && (2 << cluster_shift_) * a <= kMostVolumeSide)
+    ++cluster_shift_;
+  const int across = 1 << cluster_shift_;
+  width_ = across * a;
+  height_ = (factors_.clusters + across - 1) / across * a;
+  volumes_.assign(static_cast<std::size_t>(volume_count()),
+                  std::vector<Eigen::half>(static_cast<std::size_t>(width_) *
+                                           static_cast<std::size_t>(height_) *
+                                           static_cast<std::size_t>(b * b) * kScalarsPerVolume));
+  parallel_for(factors_.clusters, 1, [&](std::int64_t begin, std::int64_t end) {
+    for (auto k = static_cast<int>(begin); k < end; ++k) {
+      for (int j = 0; j < factors_.components; ++j) {
+        const RowMatrix measured =
+            Eigen::Map<
+                const Eigen::Matrix<Eigen::half, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+                factors_.eigen_brdf(k, j).data(),
+                static_cast<Eigen::Index>(frame_.views.size()),
+                static_cast<Eigen::Index>(frame_.lights.size()))
+                .cast<float>();
+        const RowMatrix nodes = lights_.fill() * (views_.fill() * measured).transpose();
+        std::vector<Eigen::half>& volume =
+            volumes_[static_cast<std::size_t>(j / kScalarsPerVolume)];
+        for (int z = 0; z < b * b; ++z)
+          for (int v = 0; v < a * a; ++v) {
+            const int x = k % across * a + v % a;
+            const int y = k / across * a + v / a;
+            const auto texel = (static_cast<std::size_t>(z) * static_cast<std::size_t>(height_) +
+                                static_cast<std::size_t>(y)) *
+                                   static_cast<std::size_t>(width_) +
+                               static_cast<std::size_t>(x);
+            volume[texel * kScalarsPerVolume + static_cast<std::size_t>(j % kScalarsPerVolume)] =
+                saturated_half(nodes(z, v));
+          }
+      }
+    }
+  });
+}
+
+Result<PackedLpca> PackedLpca::load(const SafetensorsFile& file, DirectionRole beyond) {
+  VENEER_ASSIGN(MaterialFrame frame, read_frame(file));
+  VENEER_ASSIGN(const std::string text, file.meta("components"));
+  const auto components = parse_two_terms(text, "a model of two terms");
+  if (!components)
+    return fail(Errc::kBadFormat, "reading {}: {}", file.path().string(), components.error().what);
+  Layout layout{*components, 0, beyond};
+  VENEER_ASSIGN(layout.angular, read_integer(file, "angular", 2, 64));
+  VENEER_ASSIGN(LpcaFactors factors,
+                read_factors(file,
+                             frame.texel_count(),
+                             layout.components[0] + layout.components[1],
+                             frame.pair_count()));
+  if (volume_bytes(frame, layout, factors.clusters) > double(kMostVolumeBytes))
+    return fail(Errc::kBadFormat,
+                "reading {}: its volumes would be too large for a GPU",
+                file.path().string());
+  return PackedLpca(std::move(frame), layout, std::move(factors));
+}
+
+void PackedLpca::add_to(Material::Contents& contents) const {
+  add_frame(frame_, contents);
+  contents.metadata["components"] = format_components(layout_.components);
+  contents.metadata["angular"] = fmt::format("{}", layout_.angular);
+  add_factors(factors_, frame_.texel_count(), contents);
+}
+
+void PackedLpca::reconstruct(int texel, std::span<float> first, std::span<float> second) const {
+  factors_.reconstruct(texel, 0, layout_.components[0], first);
+  factors_.reconstruct(texel, layout_.components[0], layout_.components[1], second);
+}
+
+Eigen::Vector2d PackedLpca::evaluate(int texel,
+                                     const Direction& view,
+                                     const Direction& light) const {
+  const GridWeights v = views_.weights(view);
+  const GridWeights l = lights_.weights(light);
+  const int a = views_.nodes();
+  const int k = factors_.cluster[static_cast<std::size_t>(texel)];
+  const int x0 = (k & ((1 << cluster_shift_) - 1)) * a;
+  const int y0 = (k >> cluster_shift_) * a;
+  const std::span<const Eigen::half> weight = factors_.weights_of(texel);
+  Eigen::Vector2d scalars = Eigen::Vector2d::Zero();
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (l.weight[i] == 0.0) continue;
+    for (std::size_t n = 0; n < 4; ++n) {
+      const auto at = (static_cast<std::size_t>(l.node[i]) * static_cast<std::size_t>(height_) +
+                       static_cast<std::size_t>(y0 + v.node[n] / a)) *
+                          static_cast<std::size_t>(width_) +
+                      static_cast<std::size_t>(x0 + v.node[n] % a);
+      for (int j = 0; j < factors_.components; ++j) {
+        const std::vector<Eigen::half>& volume =
+            volumes_[static_cast<std::size_t>(j / kScalarsPerVolume)];
+        const auto value = static_cast<double>(
+            volume[at * kScalarsPerVolume + static_cast<std::size_t>(j % kScalarsPerVolume)]);
+        scalars[j < layout_.components[0] ? 0 : 1] +=
+            l.weight[i] * v.weight[n] * static_cast<double>(weight[static_cast<std::size_t>(j)]) *
+            value;
+      }
+    }
+  }
+  return scalars;
+}
+
+ModelTexture PackedLpca::pack_texels(const Colours& colours, int words) const {
+  ModelTexture texture{.sampler = "PackedTexels",
+                       .kind = TextureKind::k2D,
+                       .format = TexelFormat::kRgba32ui,
+                       .width = frame_.width * words,
+                       .height = frame_.height};
+  std::vector<std::uint16_t> lanes(static_cast<std::size_t>(texture.width) *
+                                   static_cast<std::size_t>(texture.height) * kLanesPerWord);
+  const int per_texel = words * kLanesPerWord;
+  const int first_colour = volume_count() * kScalarsPerVolume;
+  const auto bits = [](Eigen::half h) { return Eigen::numext::bit_cast<std::uint16_t>(h); };
+  for (int texel = 0; texel < frame_.texel_count(); ++texel) {
+    const auto out = std::span(lanes).subspan(
+        static_cast<std::size_t>(texel) * static_cast<std::size_t>(per_texel),
+        static_cast<std::size_t>(per_texel));
+    std::ranges::transform(factors_.weights_of(texel), out.begin(), bits);
+    const auto count = static_cast<std::size_t>(3 * colours.count);
+    std::ranges::transform(colours.values.subspan(static_cast<std::size_t>(texel) * count, count),
+                           out.begin() + first_colour,
+                           bits);
+    out[static_cast<std::size_t>(first_colour) + count] =
+        factors_.cluster[static_cast<std::size_t>(texel)];
+  }
+  texture.data = texture_data(lanes);
+  return texture;
+}
+
+ModelShader PackedLpca::shader(const Colours& colours) const {
+  const int first_colour = volume_count() * kScalarsPerVolume;
+  const int cluster_lane = first_colour + 3 * colours.count;
+  const int words = cluster_lane / kLanesPerWord + 1;
+  const int a = views_.nodes();
+  const int b = lights_.nodes();
+
+  std::string source = fmt::format(
+      "const ivec2 kTexels = ivec2({}, {});\n"
+      "const vec2 kVolumeSize = vec2({}, {});\n"
+      "const float kViewNodes = {}.0;\n"
+      "const float kLightNodes = {}.0;\n"
+      "const uint kClusterMask = {}u;\n"
+      "const int kClusterShift = {};\n"
+      "uniform usampler2D PackedTexels;\n",
+      frame_.width,
+      frame_.height,
+      width_,
+      height_,
+      a,
+      b,
+      (1 << cluster_shift_) - 1,
+      cluster_shift_);
+  for (int v = 0; v < volume_count(); ++v)
+    source += fmt::format("uniform sampler3D Volume{};\n", v);
+  source += kElevatedConcentricGlsl;
+  source += kPackedLpcaGlsl;
+
+  source += fmt::format(
+      "void packed_evaluate(vec2 uv, vec3 view, vec3 light, out vec2 scalars, out vec3 "
+      "colours[{}]) {{\n"
+      "  ivec2 texel = packed_texel(uv);\n",
+      colours.count);
+  for (int w = 0; w < words; ++w)
+    source += fmt::format(
+        "  uvec4 word{0} = texelFetch(PackedTexels, ivec2(texel.x * {1} + {0}, texel.y), 0);\n",
+        w,
+        words);
+  source += fmt::format("  uint cluster = (word{}.{} >> {}) & 0xffffu;\n",
+                        cluster_lane / kLanesPerWord,
+                        "xyzw"[cluster_lane % kLanesPerWord / 2],
+                        cluster_lane % 2 * 16);
+  source += "  PackedPlace place = packed_place(cluster, view, light);\n  scalars = vec2(0.0);\n";
+  for (int v = 0; v < volume_count(); ++v) {
+    source += fmt::format("  vec4 eigen{0} = packed_fetch(Volume{0}, place);\n", v);
+    for (int c = 0; c < kScalarsPerVolume && v * kScalarsPerVolume + c < factors_.components; ++c) {
+      const int j = v * kScalarsPerVolume + c;
+      source += fmt::format("  scalars.{} += {} * eigen{}.{};\n",
+                            j < layout_.components[0] ? "x" : "y",
+                            lane(j),
+                            v,
+                            "xyzw"[c]);
+    }
+  }
+  for (int c = 0; c < colours.count; ++c)
+    source += fmt::format("  colours[{}] = vec3({}, {}, {});\n",
+                          c,
+                          lane(first_colour + 3 * c),
+                          lane(first_colour + 3 * c + 1),
+                          lane(first_colour + 3 * c + 2));
+  source += "}\n";
+
+  ModelShader shader;
+  shader.source = std::move(source);
+  shader.textures.push_back(pack_texels(colours, words));
+  for (int v = 0; v < volume_count(); ++v) {
+    ModelTexture volume{.sampler = fmt::format("Volume{}", v),
+                        .kind = TextureKind::k3D,
+                        .format = TexelFormat::kRgba16f,
+                        .width = width_,
+                        .height = height_,
+                        .depth = b * b,
+                        .linear = true};
+    volume.data = texture_data(volumes_[static_cast<std::size_t>(v)]);
+    shader.textures.push_back(std::move(volume));
+  }
+  shader.fetches = words + 2 * volume_count();
+  return shader;
+}
+
+}  // namespace veneer::btf

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <functional>
+#include <string>
+
+#include "btf/models/angular_grid.h"
+#include "btf/models/lpca_factors.h"
+
+namespace veneer::btf {
+
+/// Two scalar functions of (view, light) for every texel, clustered together, each a weighted sum
+/// of scalar Eigen-BRDFs that are packed four to an RGBA volume and drawn with hardware
+/// interpolation in three of the four directions' coordinates: two fetches for four components.
+/// What models of two terms (scalar times colour) have in common. Immutable and thread-safe.
+///
+/// Sources: Schneider 2004, "Real-time BTF Rendering", section 6.2 (two fetches, the fourth
+/// coordinate mixed by hand); Mueller et al. 2003 (clusters).
+class PackedLpca {
+ public:
+  /// Components of the first and the second function.
+  using Components = std::array<int, 2>;
+  /// Reads one texel's functions at every measured pair, [view][light]; thread-safe.
+  using Read = std::function<void(int texel, std::span<float> first, std::span<float> second)>;
+  /// What lights beyond the data do: kLight fades with the cosine, kView stays as at the border.
+  struct Layout {
+    Components components{};
+    int angular = 16;
+    DirectionRole beyond = DirectionRole::kLight;
+  };
+
+  /// Errors: kInvalidOption where the volumes would be larger than kMostVolumeBytes.
+  [[nodiscard]] static Result<PackedLpca> fit(const MaterialFrame& frame,
+                                              const FitOptions& options,
+                                              const Layout& layout,
+                                              const Read& read,
+                                              Progress& progress);
+  /// Reads what add_to() wrote. Errors: kBadFormat.
+  [[nodiscard]] static Result<PackedLpca> load(const SafetensorsFile& file, DirectionRole beyond);
+  void add_to(Material::Contents& contents) const;
+
+  [[nodiscard]] const MaterialFrame& frame() const { return frame_; }
+  [[nodiscard]] const Components& components() const { return layout_.components; }
+  /// Both functions of a texel at every measured pair, from the factors.
+  void reconstruct(int texel, std::span<float> first, std::span<float> second) const;
+  /// Both functions as drawn, from the float16 volumes in double precision. The horizon is the
+  /// caller's.
+  [[nodiscard]] Eigen::Vector2d evaluate(int texel,
+                                         const Direction& view,
+                                         const Direction& light) const;
+
+  /// Texels' colours as float16, three for each colour: [texel][colour][3].
+  struct Colours {
+    int count = 0;  ///< colours of a texel, 1 or 2
+    std::span<const Eigen::half> values;
+  };
+  /// GLSL constants and the function
+  /// `void packed_evaluate(vec2 uv, vec3 view, vec3 light, out vec2 scalars, out vec3
+  /// colours[count])`, its textures and fetches.
+  [[nodiscard]] ModelShader shader(const Colours& colours) const;
+
+  static constexpr std::size_t kMostVolumeBytes = std::size_t{2} << 30U;
+
+ private:
+  PackedLpca(MaterialFrame frame, Layout layout, LpcaFactors factors);
+  [[nodiscard]] int volume_count() const;
+  [[nodiscard]] ModelTexture pack_texels(const Colours& colours, int words) const;
+  void fill_volumes();
+
+  MaterialFrame frame_;
+  Layout layout_;
+  LpcaFactors factors_;
+  AngularGrid views_;
+  AngularGrid lights_;
+  // Clusters stand side by side in a volume, 2^cluster_shift_ in x, the others below in y.
+  int cluster_shift_ = 0;
+  int width_ = 0;                                  // of a volume, texels
+  int height_ = 0;                                 // of a volume, texels
+  std::vector<std::vector<Eigen::half>> volumes_;  // [volume][z][y][x][4]
+};
+
+}  // namespace veneer::btf

@@ -1,0 +1,6 @@
+vec3 btf_radiance(vec2 uv, vec3 view, vec3 light) {
+  vec2 scalars;
+  vec3 colours[2];
+  packed_evaluate(uv, view, light, scalars, colours);
+  return light.z > 0.0 ? max(scalars.x * colours[0] + scalars.y * colours[1], 0.0) : vec3(0.0);
+}
