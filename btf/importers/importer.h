@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "base/progress.h"
-#include "base/result.h"
-
 #include <filesystem>
 #include <optional>
 #include <span>
 #include <string_view>
+
+#include "base/progress.h"
+#include "base/result.h"
 
 namespace veneer::btf {
 
@@ -27,8 +27,8 @@ struct ImportOptions {
 struct Importer {
   std::string_view name;
   std::string_view summary;
-  /// Errors: kNotFound, kBadFormat (names the file and what is wrong with it), kInvalidOption (a crop
-  /// outside the source).
+  /// Errors: kNotFound, kBadFormat (names the file and what is wrong with it), kInvalidOption (a
+  /// crop outside the source).
   Status (*run)(const std::filesystem::path& source,
                 const std::filesystem::path& set,
                 const ImportOptions& options,

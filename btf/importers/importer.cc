@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "btf/importers/importer.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include "btf/importers/btfbase/btfbase.h"
+#include "btf/importers/crop.h"
+#include "btf/importers/rti/rti.h"
+
+namespace veneer::btf {
+namespace {
+
+constexpr std::array kImporters{
+    Importer{"btfbase",
+             "text code-books of multi-level vector quantisation (Havran 2010)",
+             &import_btfbase},
+    Importer{"rti", "a fixed camera and many lights: a .lp file and its pictures", &import_rti},
+};
+static_assert(std::ranges::is_sorted(kImporters, {}, &Importer::name));
+
+}  // namespace
+
+std::span<const Importer> importers() { return kImporters; }
+
+Result<const Importer*> find_importer(std::string_view name) {
+  for (const Importer& importer : kImporters) {
+    if (importer.name == name) return &importer;
+  }
+  std::string known;
+  for (const Importer& importer : kImporters) known += fmt::format(" {}", importer.name);
+  return fail(Errc::kInvalidOption, "there is no importer \"{}\"; there are:{}", name, known);
+}
+
+Result<Crop> crop_of(const ImportOptions& options, int width, int height, std::string_view doing) {
+  if (!options.crop) return Crop{0, 0, width, height};
+  const Crop crop = *options.crop;
+  // Compared without sums, which could overflow.
+  const bool inside = crop.x >= 0 && crop.y >= 0 && crop.width > 0 && crop.height > 0 &&
+                      crop.x < width && crop.y < height && crop.width <= width - crop.x &&
+                      crop.height <= height - crop.y;
+  if (!inside)
+    return fail(Errc::kInvalidOption,
+                "{}: the crop {},{},{},{} does not lie inside the source's {} x {} texels",
+                doing,
+                crop.x,
+                crop.y,
+                crop.width,
+                crop.height,
+                width,
+                height);
+  return crop;
+}
+
+}  // namespace veneer::btf
