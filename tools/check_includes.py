@@ -28,7 +28,7 @@ ABOVE_ALL_FLOORS = ("tests", "benchmarks")
 
 # What the virtual bench must not know of, and which of its files are the adaptors that do: they
 # give the bench the faces of the HAL.
-BENCH_PHYSICS = "simulation/bench/*"
+BENCH_PHYSICS = ("simulation/bench.h", "simulation/bench/*")
 BENCH_ADAPTORS = ("simulation/bench/colorimeter*", "simulation/bench/*_test.cc")
 JUDGED_BY_BENCH = ("render/", "calibration/")
 
@@ -87,8 +87,8 @@ class Checker:
         self.problems.append(f"{path}:{line}: {text}")
 
     def module_of(self, path):
-        """The innermost module folder around a file, or None."""
-        folder = path
+        """The innermost module folder around a file, or None; a/b.h is the face of the module a/b."""
+        folder = path.rpartition(".")[0] + "/"
         while "/" in folder:
             folder = folder.rpartition("/")[0]
             if folder in self.floors:
@@ -109,7 +109,7 @@ class Checker:
                     self._check_driver_header(path, line, include)
                 else:
                     self._check_quoted(path, line, include)
-            if matches(path, (BENCH_PHYSICS,)) and not matches(path, BENCH_ADAPTORS):
+            if matches(path, BENCH_PHYSICS) and not matches(path, BENCH_ADAPTORS):
                 self._check_bench(path)
         return self.problems
 

@@ -27,9 +27,10 @@ SOUND = {
     "render/CMakeLists.txt": "veneer_add_module(render LAYER 5 SRCS r.cc)\n",
     "render/r.h": HEADER + '#include "calibration/c.h"\n',
     "render/internal_gl.h": HEADER + "#include <epoxy/gl.h>\n",
-    "simulation/CMakeLists.txt": "veneer_add_module(simulation LAYER 6 SRCS s.cc)\n",
-    "simulation/view.h": HEADER,
-    "simulation/bench/projector.h": HEADER + '#include "base/a.h"\n#include "simulation/view.h"\n',
+    "simulation/CMakeLists.txt": "add_subdirectory(bench)\n",
+    "simulation/bench.h": HEADER,
+    "simulation/bench/CMakeLists.txt": "veneer_add_module(bench LAYER 6 SRCS s.cc)\n",
+    "simulation/bench/projector.h": HEADER + '#include "base/a.h"\n#include "simulation/bench.h"\n',
     "simulation/bench/colorimeter.h": HEADER + '#include "calibration/c.h"\n',
     "tests/end_to_end_test.cc": SPDX + '#include "render/r.h"\n',
     "build/generated/stray.h": "not ours\n",
@@ -86,15 +87,21 @@ class CheckIncludes(unittest.TestCase):
 
     def test_bench_physics_may_not_reach_it_through_another_header(self):
         self.assert_one_problem(
-            {"simulation/view.h": HEADER + '#include "render/r.h"\n'},
-            "simulation/bench/projector.h:4:",
-            "simulation/view.h -> render/r.h",
+            {"simulation/bench/projector.h": HEADER + '#include "simulation/bench/colorimeter.h"\n'},
+            "simulation/bench/projector.h:3:",
+            "simulation/bench/colorimeter.h -> calibration/c.h",
         )
 
     def test_circle_of_includes_ends(self):
         self.assertEqual(
-            self.problems({"simulation/view.h": HEADER + '#include "simulation/bench/projector.h"\n'}),
+            self.problems({"simulation/bench.h": HEADER + '#include "simulation/bench/projector.h"\n'}),
             [],
+        )
+
+    def test_face_of_a_module_is_part_of_it(self):
+        self.assert_one_problem(
+            {"simulation/bench.h": HEADER + '#include "render/r.h"\n', "simulation/bench/projector.h": HEADER},
+            "simulation/bench.h:3:",
         )
 
     def test_driver_header_is_refused_in_public_headers_only(self):
