@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/config.h"
+
+namespace veneer::daemon {
+namespace {
+
+void check_range(TomlReader& toml, std::string_view key, double value, double least, double most) {
+  if (!(value >= least && value <= most)) {
+    toml.add_error(key, fmt::format("{} is outside {} to {}", value, least, most));
+  }
+}
+
+void read_path(TomlReader& toml, std::string_view key, std::filesystem::path& path, bool required) {
+  if (required) {
+    toml.require(key, path);
+  } else {
+    toml.read(key, path);
+  }
+  if (!path.empty()) path = toml.folder() / path;
+}
+
+}  // namespace
+
+Result<Config> Config::read(TomlReader& toml) {
+  Config config;
+  read_path(toml, "scene", config.scene, true);
+  read_path(toml, "material", config.material, true);
+  read_path(toml, "profile", config.profile, true);
+  read_path(toml, "summary", config.summary, false);
+  read_path(toml, "frame_log", config.frame_log, false);
+
+  std::string clock = "monotonic";
+  toml.read("clock", clock);
+  if (clock == "virtual") {
+    config.clock = ClockKind::kVirtual;
+  } else if (clock != "monotonic") {
+    toml.add_error("clock", "expected \"monotonic\" or \"virtual\"");
+  }
+  toml.read("frames", config.frames);
+  toml.read("frame_rate_hz", config.frame_rate_hz);
+  toml.read("display_latency_ms", config.display_latency_ms);
+  toml.read("first_pose_timeout_s", config.first_pose_timeout_s);
+  check_range(toml, "frame_rate_hz", config.frame_rate_hz, 1, 1000);
+  check_range(toml, "display_latency_ms", config.display_latency_ms, 0, 1000);
+  check_range(toml, "first_pose_timeout_s", config.first_pose_timeout_s, 1e-3, 3600);
+
+  TomlReader render = toml.table("render");
+  render.read("compensate", config.render.compensate);
+  render.read("dither", config.render.dither);
+  render.read("geometry_floor", config.render.geometry_floor);
+  check_range(render, "geometry_floor", config.render.geometry_floor, 1e-6, 1);
+
+  TomlReader prediction = toml.table("prediction");
+  prediction.read("horizon_s", config.prediction.horizon_s);
+  prediction.read("decay_s", config.prediction.decay_s);
+  prediction.read("velocity_window_s", config.prediction.velocity_window_s);
+  if (const Status status = config.prediction.check(); !status) {
+    toml.add_error("prediction", status.error().what);
+  }
+  return config;
+}
+
+}  // namespace veneer::daemon

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/config.h"
+
+#include <gtest/gtest.h>
+
+namespace veneer::daemon {
+namespace {
+
+constexpr const char* kLeast = "scene = \"s.toml\"\nmaterial = \"m\"\nprofile = \"p\"\n";
+
+Status read(const std::string& more, Config* out = nullptr) {
+  TomlReader toml = TomlReader::parse(std::string(kLeast) + more, "veneer.toml").value();
+  Result<Config> config = Config::read(toml);
+  if (config && out != nullptr) *out = *config;
+  return toml.finish();
+}
+
+TEST(Config, HasDefaultsForAllButItsInputs) {
+  Config config;
+  const Status status = read("", &config);
+  ASSERT_TRUE(status) << status.error().what;
+  EXPECT_EQ(config.clock, ClockKind::kMonotonic);
+  EXPECT_EQ(config.frames, 0U);
+  EXPECT_TRUE(config.render.compensate);
+}
+
+TEST(Config, ReadsEveryKey) {
+  Config config;
+  ASSERT_TRUE(
+      read("clock = \"virtual\"\nframes = 12\nframe_rate_hz = 50\ndisplay_latency_ms = 30\n"
+           "summary = \"s.json\"\n[render]\ncompensate = false\ndither = false\n"
+           "geometry_floor = 0.1\n[prediction]\nhorizon_s = 0.1\n",
+           &config));
+  EXPECT_EQ(config.clock, ClockKind::kVirtual);
+  EXPECT_EQ(config.frames, 12U);
+  EXPECT_EQ(config.frame_rate_hz, 50);
+  EXPECT_FALSE(config.render.compensate);
+  EXPECT_EQ(config.render.geometry_floor, 0.1);
+  EXPECT_EQ(config.prediction.horizon_s, 0.1);
+}
+
+TEST(Config, RefusesWhatMakesNoSense) {
+  for (const char* line : {"frame_rate_hz = 0",
+                           "frame_rate_hz = -3",
+                           "frames = -1",
+                           "display_latency_ms = 1e9",
+                           "clock = \"sundial\"",
+                           "framerate = 60",
+                           "[render]\ngeometry_floor = 0",
+                           "[render]\ncompensation = true",
+                           "[prediction]\nhorizon_s = -1"}) {
+    const Status status = read(line);
+    ASSERT_FALSE(status) << line;
+    EXPECT_EQ(status.error().code, Errc::kInvalidOption) << line;
+  }
+}
+
+TEST(Config, NamesWhatIsMissing) {
+  TomlReader toml = TomlReader::parse("scene = \"s\"\n", "veneer.toml").value();
+  ASSERT_TRUE(Config::read(toml));
+  const std::string what = toml.finish().error().what;
+  EXPECT_NE(what.find("material"), std::string::npos);
+  EXPECT_NE(what.find("profile"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace veneer::daemon

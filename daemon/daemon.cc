@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/daemon.h"
+
+#include <spdlog/spdlog.h>
+
+#include <memory>
+
+#include "btf/material.h"
+#include "calibration/profile.h"
+#include "daemon/config.h"
+#include "projector/outputs.h"
+#include "tracking/drivers.h"
+
+namespace veneer::daemon {
+
+Result<Summary> run(const std::filesystem::path& config_path,
+                    const std::vector<std::string>& settings,
+                    const std::atomic<bool>& stop,
+                    Progress& progress) {
+  VENEER_ASSIGN(TomlReader toml, TomlReader::open(config_path, settings));
+  VENEER_ASSIGN(const Config config, Config::read(toml));
+
+  // Mistakes in the configuration are found before any device is touched for long: opening is
+  // quick.
+  std::unique_ptr<Clock> clock;
+  if (config.clock == ClockKind::kVirtual) {
+    clock = std::make_unique<VirtualClock>();
+  } else {
+    clock = std::make_unique<SteadyClock>();
+  }
+  TomlReader tracker_table = toml.table("tracker");
+  const Time tracker_start = clock->now();
+  VENEER_ASSIGN(const std::unique_ptr<tracking::Tracker> tracker,
+                tracking::open_tracker(tracker_table, *clock));
+  TomlReader output_table = toml.table("output");
+  VENEER_ASSIGN(const std::unique_ptr<projector::Output> output,
+                projector::open_output(output_table));
+  VENEER_TRY(toml.finish());
+
+  VENEER_ASSIGN(const render::Scene scene, render::Scene::load(config.scene));
+  VENEER_ASSIGN(const std::unique_ptr<btf::Material> material, btf::load_material(config.material));
+  VENEER_ASSIGN(const calibration::ProjectorProfile profile,
+                calibration::ProjectorProfile::load(config.profile));
+  VENEER_ASSIGN(const std::unique_ptr<render::Renderer> renderer,
+                render::Renderer::create(scene, *material, profile, config.render));
+  spdlog::info(
+      "material: {}, {} x {} texels", material->model(), material->width(), material->height());
+  spdlog::info("renderer: {}", renderer->description());
+  spdlog::info("tracker: {}", tracker->description());
+  spdlog::info("output: {}", output->description());
+
+  std::vector<tracking::BodyId> bodies{scene.observer_body};
+  if (scene.object_body >= 0 && scene.object_body != scene.observer_body) {
+    bodies.push_back(scene.object_body);
+  }
+  PoseFeed poses(*tracker, *clock, config.clock, bodies, config.prediction);
+  const Raster raster{profile.geometry.width, profile.geometry.height, profile.bits};
+  FrameLoop loop(config, scene, raster, *clock, poses, *renderer, *output);
+  VENEER_ASSIGN(const RunRecord record, loop.run(stop, progress));
+
+  Summary summary = summarise(record);
+  summary.rejected_poses = poses.rejected();
+  summary.renderer = renderer->description();
+  summary.tracker = tracker->description();
+  summary.output = output->description();
+  summary.tracker_start = tracker_start;
+  if (!config.summary.empty()) VENEER_TRY(write_summary(summary, config.summary));
+  if (!config.frame_log.empty()) VENEER_TRY(write_frame_log(record, config.frame_log));
+  return summary;
+}
+
+}  // namespace veneer::daemon

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "base/clock.h"
+#include "base/progress.h"
+#include "base/result.h"
+#include "daemon/config.h"
+#include "daemon/pose_feed.h"
+#include "projector/output.h"
+#include "render/renderer.h"
+#include "render/scene.h"
+
+namespace veneer::daemon {
+
+/// What is remembered of one frame.
+struct FrameRecord {
+  std::uint64_t number = 0;
+  Time display_time;
+  double frame_ms = 0;     ///< real time from the pose query to the frame handed over
+  double pose_age_ms = 0;  ///< from the newest sample to the moment of display
+  tracking::PoseOrigin origin = tracking::PoseOrigin::kNone;
+  Eigen::Vector3d eye_in_world = Eigen::Vector3d::Zero();  ///< as predicted
+  render::FrameStatistics statistics;
+};
+
+/// Frames that a run remembers: a quarter of an hour and more at 60 a second, in bounded memory.
+inline constexpr std::size_t kRememberedFrames = 1U << 16U;
+
+struct RunRecord {
+  std::vector<FrameRecord> frames;  ///< the last kRememberedFrames, oldest first
+  std::uint64_t count = 0;          ///< all
+  std::uint64_t dropped = 0;        ///< display periods for which no frame was ready
+  std::uint64_t late = 0;           ///< frames that took longer than a period to make
+  double seconds = 0;               ///< real time from the first frame to the last
+};
+
+/// The projector's raster.
+struct Raster {
+  int width = 0;
+  int height = 0;
+  int bits = 8;
+};
+
+/// Tracker -> predict -> draw -> compensate -> present, once a frame period. Borrows all it is
+/// given.
+class FrameLoop {
+ public:
+  FrameLoop(const Config& config,
+            const render::Scene& scene,
+            const Raster& raster,
+            Clock& clock,
+            PoseFeed& poses,
+            render::Renderer& renderer,
+            projector::Output& output);
+  /// Runs until Config::frames are made or `stop` becomes true.
+  /// Errors: kTimeout (no first pose), kDisconnected (tracker gone before it), what the output
+  /// says.
+  [[nodiscard]] Result<RunRecord> run(const std::atomic<bool>& stop, Progress& progress);
+
+ private:
+  [[nodiscard]] Status wait_for_first_pose(const std::atomic<bool>& stop);
+  [[nodiscard]] Result<FrameRecord> make_frame(std::uint64_t number, Time start);
+
+  const Config& config_;
+  const render::Scene& scene_;
+  Raster raster_;
+  Clock& clock_;
+  PoseFeed& poses_;
+  render::Renderer& renderer_;
+  projector::Output& output_;
+  Image<Rgb16> codes_;    // empty where the output wants no pixels
+  Image<Rgb32f> target_;  // empty where the output wants no target
+};
+
+}  // namespace veneer::daemon

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// veneerd: drives the projector until it is told to stop.
+#include <CLI/CLI.hpp>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <atomic>
+#include <csignal>
+
+#include "base/exit_code.h"
+#include "daemon/daemon.h"
+
+namespace {
+
+std::atomic<bool> stop_requested{false};
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler sets it");
+
+void request_stop(int) { stop_requested = true; }
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace veneer;
+  CLI::App app("Drives a projector so that an object looks as if it were made of another material.",
+               "veneerd");
+  std::filesystem::path config = "/etc/veneer/veneer.toml";
+  std::vector<std::string> settings;
+  bool quiet = false;
+  app.add_option("--config", config, "The configuration")->capture_default_str();
+  app.add_option("--set",
+                 settings,
+                 "Replace a value of the configuration: --set frames=120 --set output.every=10");
+  app.add_flag("--quiet", quiet, "Say only what goes wrong");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kExitDone : kExitUsage;
+  }
+
+  spdlog::set_default_logger(spdlog::stderr_color_st("veneerd"));
+  spdlog::set_pattern("%n %^%l%$: %v");
+  if (quiet) spdlog::set_level(spdlog::level::warn);
+  struct sigaction action {};
+  action.sa_handler = request_stop;
+  sigaction(SIGTERM, &action, nullptr);
+  sigaction(SIGINT, &action, nullptr);
+
+  SilentProgress silent;
+  const std::unique_ptr<Progress> progress = quiet ? nullptr : make_progress();
+  const Result<daemon::Summary> summary = daemon::run(
+      config, settings, stop_requested, quiet ? static_cast<Progress&>(silent) : *progress);
+  if (!summary) {
+    spdlog::error("{}", summary.error().what);
+    return exit_code_of(summary.error());
+  }
+  if (stop_requested) spdlog::info("stopped by a signal");
+  spdlog::info("{}", daemon::text_of(*summary));
+  return kExitDone;
+}

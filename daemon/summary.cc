@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/summary.h"
+
+#include <nlohmann/json.hpp>
+
+#include "base/files.h"
+#include "base/statistics.h"
+
+namespace veneer::daemon {
+
+Summary summarise(const RunRecord& run) {
+  Summary summary;
+  std::vector<double> frame_ms;
+  std::vector<double> pose_age_ms;
+  double covered = 0;
+  for (const FrameRecord& frame : run.frames) {
+    frame_ms.push_back(frame.frame_ms);
+    pose_age_ms.push_back(frame.pose_age_ms);
+    const auto pixels = static_cast<double>(frame.statistics.covered_pixels);
+    covered += pixels;
+    summary.out_of_gamut += static_cast<double>(frame.statistics.out_of_gamut_pixels);
+    summary.out_of_reach += static_cast<double>(frame.statistics.out_of_reach_pixels);
+    summary.gamut_loss_mean += pixels * frame.statistics.gamut_loss_mean;
+  }
+  if (covered > 0) {
+    summary.out_of_gamut /= covered;
+    summary.out_of_reach /= covered;
+    summary.gamut_loss_mean /= covered;
+  }
+  summary.frames = run.count;
+  summary.fps = run.seconds > 0 ? static_cast<double>(run.count) / run.seconds : 0;
+  summary.frame_ms_p50 = quantile(frame_ms, 0.5);
+  summary.frame_ms_p99 = quantile(frame_ms, 0.99);
+  summary.pose_age_ms_p50 = quantile(pose_age_ms, 0.5);
+  summary.pose_age_ms_p99 = quantile(pose_age_ms, 0.99);
+  summary.dropped = run.dropped;
+  summary.late = run.late;
+  return summary;
+}
+
+std::string text_of(const Summary& summary) {
+  return fmt::format(
+      "{} frames at {:.1f} a second; a frame takes {:.1f} ms (p99 {:.1f}), its pose is {:.1f} ms "
+      "old "
+      "(p99 {:.1f}) when it is seen; {} dropped, {} late; {:.1f} % of the pixels out of gamut",
+      summary.frames,
+      summary.fps,
+      summary.frame_ms_p50,
+      summary.frame_ms_p99,
+      summary.pose_age_ms_p50,
+      summary.pose_age_ms_p99,
+      summary.dropped,
+      summary.late,
+      100 * summary.out_of_gamut);
+}
+
+Status write_summary(const Summary& summary, const std::filesystem::path& path) {
+  const nlohmann::ordered_json json{
+      {"frames", summary.frames},
+      {"fps", summary.fps},
+      {"frame_ms_p50", summary.frame_ms_p50},
+      {"frame_ms_p99", summary.frame_ms_p99},
+      {"pose_age_ms_p50", summary.pose_age_ms_p50},
+      {"pose_age_ms_p99", summary.pose_age_ms_p99},
+      {"dropped_frames", summary.dropped},
+      {"late_frames", summary.late},
+      {"rejected_poses", summary.rejected_poses},
+      {"out_of_gamut", summary.out_of_gamut},
+      {"out_of_reach", summary.out_of_reach},
+      {"gamut_loss_mean", summary.gamut_loss_mean},
+      {"renderer", summary.renderer},
+      {"tracker", summary.tracker},
+      {"output", summary.output},
+      {"tracker_start_ns", summary.tracker_start.time_since_epoch().count()},
+  };
+  return write_text(path, json.dump(2) + "\n");
+}
+
+Status write_frame_log(const RunRecord& run, const std::filesystem::path& path) {
+  std::string text =
+      "frame,display_time_ns,frame_ms,gpu_ms,pose_age_ms,eye_x,eye_y,eye_z,covered,out_of_gamut\n";
+  for (const FrameRecord& frame : run.frames) {
+    const std::optional<double>& gpu_ms = frame.statistics.gpu_ms;
+    text += fmt::format("{},{},{:.4f},{},{:.4f},{:.6f},{:.6f},{:.6f},{},{}\n",
+                        frame.number,
+                        frame.display_time.time_since_epoch().count(),
+                        frame.frame_ms,
+                        gpu_ms ? fmt::format("{:.4f}", *gpu_ms) : "",
+                        frame.pose_age_ms,
+                        frame.eye_in_world.x(),
+                        frame.eye_in_world.y(),
+                        frame.eye_in_world.z(),
+                        frame.statistics.covered_pixels,
+                        frame.statistics.out_of_gamut_pixels);
+  }
+  return write_text(path, text);
+}
+
+}  // namespace veneer::daemon

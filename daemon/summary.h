@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "base/result.h"
+#include "daemon/frame_loop.h"
+
+namespace veneer::daemon {
+
+/// The figures of a run, for the log, the summary file and reports.
+struct Summary {
+  std::uint64_t frames = 0;
+  double fps = 0;
+  double frame_ms_p50 = 0;
+  double frame_ms_p99 = 0;
+  double pose_age_ms_p50 = 0;
+  double pose_age_ms_p99 = 0;
+  std::uint64_t dropped = 0;
+  std::uint64_t late = 0;
+  std::uint64_t rejected_poses = 0;
+  double out_of_gamut = 0;     ///< fraction of the covered pixels, over all frames
+  double out_of_reach = 0;     ///< likewise, too dark for the projector's angle
+  double gamut_loss_mean = 0;  ///< FrameStatistics::gamut_loss_mean over all frames
+  std::string renderer;
+  std::string tracker;
+  std::string output;
+  Time tracker_start;  ///< time zero of a simulated tracker's paths
+};
+
+[[nodiscard]] Summary summarise(const RunRecord& run);
+/// One line for people.
+[[nodiscard]] std::string text_of(const Summary& summary);
+/// Written whole or not at all.
+[[nodiscard]] Status write_summary(const Summary& summary, const std::filesystem::path& path);
+/// CSV: frame, display_time_ns, frame_ms, gpu_ms, pose_age_ms, eye x, y, z, pixels covered and out
+/// of gamut.
+[[nodiscard]] Status write_frame_log(const RunRecord& run, const std::filesystem::path& path);
+
+}  // namespace veneer::daemon
