@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json_fwd.hpp>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/progress.h"
+#include "base/result.h"
+
+namespace veneer::cli {
+
+/// What every command has in common: its arguments, --json, --quiet, progress and the result.
+class CommandLine {
+ public:
+  CommandLine(std::string name, std::string summary, std::vector<std::string> arguments);
+
+  /// Where a command declares its options, before parse().
+  [[nodiscard]] CLI::App& app() { return app_; }
+  /// Reads the arguments into the declared options. Throws CLI::ParseError, which main() turns into
+  /// help or a usage error.
+  void parse();
+  /// Silent with --quiet; writes to standard error only.
+  [[nodiscard]] Progress& progress() { return *progress_; }
+  [[nodiscard]] bool json() const { return json_; }
+  /// Prints the result: `object` with --json, else `text` (nothing where it is empty).
+  void print(const nlohmann::ordered_json& object, const std::string& text) const;
+  /// A remark on standard error, unless --quiet.
+  void note(const std::string& text) const;
+
+ private:
+  CLI::App app_;
+  std::vector<std::string> arguments_;
+  bool json_ = false;
+  bool quiet_ = false;
+  std::unique_ptr<Progress> progress_;
+};
+
+/// A command: declares its options, parses, works, prints; returns the exit code.
+using RunCommand = Result<int> (*)(CommandLine& line);
+
+}  // namespace veneer::cli

@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <nlohmann/json.hpp>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstring>
+#include <system_error>
+
+#include "base/exit_code.h"
+#include "base/files.h"
+#include "btf/material.h"
+#include "btf/sample_set.h"
+#include "calibration/radiometry.h"
+#include "cli/commands/commands.h"
+#include "cli/report/report.h"
+#include "render/scene.h"
+#include "simulation/bench/colorimeter.h"
+#include "simulation/materials/synthesize.h"
+
+namespace veneer::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Of every n-th frame pictures are made and colours compared.
+constexpr int kLookAtEvery = 5;
+/// Without compensation this part of the frames is enough.
+constexpr std::string_view kUncompensated = "frames-uncompensated";
+
+struct DemoOptions {
+  fs::path etc;  ///< the project's folder etc
+  fs::path out = "out/demo";
+  fs::path set;  ///< the embedded material where empty
+  std::string model;
+  int frames = 120;
+  btf::FitOptions fit;
+};
+
+fs::path program_folder() { return fs::read_symlink("/proc/self/exe").parent_path(); }
+
+/// build/bin/veneer lies two folders below the project.
+fs::path default_etc() { return (program_folder() / "../../etc").lexically_normal(); }
+
+/// Runs a program beside this one and waits for it. Errors: kIo with its exit code.
+Status run_program(const std::string& name, std::vector<std::string> arguments) {
+  const std::string path = (program_folder() / name).string();
+  arguments.insert(arguments.begin(), path);
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  pid_t pid = 0;
+  if (const int error = ::posix_spawn(&pid, path.c_str(), nullptr, nullptr, argv.data(), environ);
+      error != 0) {
+    return fail(Errc::kIo, "starting {}: {}", path, std::strerror(error));
+  }
+  int status = 0;
+  while (::waitpid(pid, &status, 0) < 0) {
+    if (errno != EINTR) return fail(Errc::kIo, "waiting for {}: {}", path, std::strerror(errno));
+  }
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != kExitDone) {
+    return fail(Errc::kIo, "{} failed; what it says above tells why", name);
+  }
+  return {};
+}
+
+/// The sample set that the demo shows: the user's, or cloth that is path-traced at the first run.
+Result<fs::path> sample_set(const DemoOptions& options, Progress& progress) {
+  if (!options.set.empty()) return options.set;
+  const fs::path set = options.out / "cloth.btfset";
+  if (btf::SampleSet::open(set)) return set;
+  VENEER_ASSIGN(const simulation::HeightFieldMaterial* cloth,
+                simulation::find_height_field_material("cloth"));
+  VENEER_TRY(simulation::synthesize(*cloth, set, {}, progress));
+  return set;
+}
+
+/// The material fitted to `set`; one of an earlier run is kept where it was fitted alike.
+Status fit_material(const DemoOptions& options,
+                    const fs::path& set_path,
+                    const fs::path& material_path,
+                    Progress& progress) {
+  VENEER_ASSIGN(const btf::SampleSet set, btf::SampleSet::open(set_path));
+  VENEER_ASSIGN(const btf::Model* model, btf::find_model(options.model));
+  std::error_code error;
+  const std::map<std::string, std::string> provenance{
+      {"fitted_on", fs::weakly_canonical(set_path, error).string()},
+      {"clusters", std::to_string(options.fit.clusters)},
+      {"components", options.fit.components},
+      {"angular", std::to_string(options.fit.angular)}};
+  if (const Result<SafetensorsFile> old = SafetensorsFile::open(material_path)) {
+    const bool newer = fs::last_write_time(material_path, error) >
+                       fs::last_write_time(set_path / "samples.safetensors", error);
+    const bool alike = std::ranges::all_of(provenance, [&old](const auto& entry) {
+      const auto found = old->metadata().find(entry.first);
+      return found != old->metadata().end() && found->second == entry.second;
+    });
+    if (newer && alike && old->meta("model") == options.model && btf::load_material(material_path))
+      return {};
+  }
+  VENEER_ASSIGN(const std::unique_ptr<btf::Material> material,
+                model->fit(set, options.fit, progress));
+  return btf::save_material(*material, material_path, provenance);
+}
+
+Status measure_profile(const fs::path& bench_path,
+                       const fs::path& profile_path,
+                       Progress& progress) {
+  VENEER_ASSIGN(const std::unique_ptr<simulation::Bench> bench,
+                simulation::Bench::load(bench_path));
+  simulation::VirtualPatchDisplay display(*bench);
+  simulation::VirtualColorimeter colorimeter(*bench, display, {});
+  calibration::RadiometryOptions options;
+  options.bits = bench->truth().projector.bits;
+  options.reference_distance_m = bench->truth().projector.reference_distance_m;
+  VENEER_ASSIGN(const calibration::MeasuredProfile measured,
+                calibration::measure_profile(
+                    colorimeter, display, simulation::true_geometry(*bench), options, progress));
+  return measured.profile.save(profile_path);
+}
+
+/// Removes what an earlier run left, so that no old picture is taken for a new one.
+Status clear_results(const fs::path& out) {
+  std::error_code error;
+  for (const char* name : {"frames",
+                           "frames-uncompensated",
+                           "pictures",
+                           "run.json",
+                           "frames.csv",
+                           "report.json",
+                           "index.html"}) {
+    fs::remove_all(out / name, error);
+    if (error) return fail(Errc::kIo, "removing {}: {}", (out / name).string(), error.message());
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<int> run_demo(CommandLine& line) {
+  DemoOptions options;
+  options.etc = default_etc();
+  // The embedded cloth is fitted with these; a user's set may want others.
+  options.fit.clusters = 32;
+  options.fit.angular = 24;
+  CLI::App& app = line.app();
+  app.add_option("--out", options.out, "Where everything is written")->capture_default_str();
+  app.add_option("--set", options.set, "Show this sample set in place of the embedded cloth");
+  app.add_option("--model", options.model, "Fit this model (veneer fit --help lists them)")
+      ->default_val("texel-colours");
+  auto* components = app.add_option("--components", options.fit.components, "Its components");
+  app.add_option("--clusters", options.fit.clusters, "Its clusters")->capture_default_str();
+  app.add_option("--angular", options.fit.angular, "Its direction nodes")->capture_default_str();
+  app.add_option("--frames", options.frames, "Frames of the walk")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100000));
+  app.add_option("--etc", options.etc, "The project's folder etc");
+  line.parse();
+  const bool scalars = options.model == "texel-colours" || options.model == "dichromatic-lpca";
+  if (components->count() == 0) options.fit.components = scalars ? "6+2" : "8";
+
+  const fs::path& out = options.out;
+  const fs::path bench = options.etc / "benches" / "demo.toml";
+  VENEER_TRY(clear_results(out));
+  VENEER_ASSIGN(const fs::path set, sample_set(options, line.progress()));
+  VENEER_TRY(fit_material(options, set, out / "material.safetensors", line.progress()));
+  VENEER_TRY(measure_profile(bench, out / "profile", line.progress()));
+  for (const char* name : {"veneer.toml", "scene.toml"}) {
+    VENEER_ASSIGN(const std::string text, read_text(options.etc / "demo" / name));
+    VENEER_TRY(write_text(out / name, text));
+  }
+
+  const std::string config = (out / "veneer.toml").string();
+  const std::string frames = fmt::format("frames={}", options.frames);
+  std::vector<std::string> arguments{"--config", config, "--set", frames};
+  VENEER_TRY(run_program("veneerd", arguments));
+  line.note("and once more without compensation, for comparison");
+  arguments.insert(arguments.end(),
+                   {"--set",
+                    "render.compensate=false",
+                    "--set",
+                    fmt::format("output.folder=\"{}\"", kUncompensated),
+                    "--set",
+                    fmt::format("output.every={}", kLookAtEvery),
+                    "--set",
+                    "summary=\"\"",
+                    "--set",
+                    "frame_log=\"\""});
+  VENEER_TRY(run_program("veneerd", arguments));
+
+  const RecordedRun run{out, "frames", std::string(kUncompensated)};
+  const VerificationOptions verification_options{bench, set, kLookAtEvery, out / "pictures"};
+  VENEER_ASSIGN(const RunVerification verification,
+                verify_run(run, verification_options, line.progress()));
+  VENEER_ASSIGN(const std::string run_text, read_text(out / "run.json"));
+  VENEER_ASSIGN(const render::Scene scene, render::Scene::load(out / "scene.toml"));
+  const nlohmann::ordered_json report = report_json(
+      nlohmann::json::parse(run_text),
+      verification,
+      {},
+      fmt::format("{} ({} {})", set.stem().string(), options.model, options.fit.components),
+      scene.mesh_name);
+  VENEER_TRY(write_report(report, verification, out));
+
+  const bool met = gates_met(report);
+  line.print(report,
+             fmt::format("dE00 in gamut: {:.2f} mean, {:.2f} at 95 %; {:.1f} % of the pixels in "
+                         "gamut; over all {:.2f} mean\n"
+                         "without compensation: {:.2f} mean\n"
+                         "look at {}",
+                         verification.within_gamut.mean,
+                         verification.within_gamut.p95,
+                         100 * verification.in_gamut_fraction,
+                         verification.covered.mean,
+                         verification.uncompensated.mean,
+                         (out / "index.html").string()));
+  // A user's own material is reported, not judged: nobody promised how well it fits.
+  if (!met && options.set.empty()) {
+    line.note("a quality gate was missed: see \"gates\" in " + (out / "report.json").string());
+    return kExitGateMissed;
+  }
+  return kExitDone;
+}
+
+}  // namespace veneer::cli

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <nlohmann/json.hpp>
+
+#include "base/exit_code.h"
+#include "base/image_files.h"
+#include "btf/material.h"
+#include "calibration/profile.h"
+#include "cli/commands/commands.h"
+#include "render/renderer.h"
+
+namespace veneer::cli {
+
+Result<int> run_render(CommandLine& line) {
+  std::filesystem::path scene_path;
+  std::filesystem::path material_path;
+  std::filesystem::path profile_path;
+  std::filesystem::path out;
+  std::vector<double> eye{0, 0, 1};
+  render::RendererOptions options;
+  bool uncompensated = false;
+  CLI::App& app = line.app();
+  app.add_option("scene", scene_path, "The scene, scene.toml")->required();
+  app.add_option("--material", material_path, "The material, NAME.safetensors")->required();
+  app.add_option("--profile", profile_path, "The projector profile (veneer calibrate writes one)")
+      ->required();
+  app.add_option("--eye", eye, "Where the eye is, x,y,z in metres")
+      ->delimiter(',')
+      ->expected(3)
+      ->capture_default_str();
+  app.add_flag(
+      "--uncompensated", uncompensated, "Send the target as if projector and surface were ideal");
+  app.add_option("-o,--output",
+                 out,
+                 "frame.png: the drive codes; frame.exr: the luminance aimed at, XYZ in cd/m^2")
+      ->required();
+  line.parse();
+  if (out.extension() != ".png" && out.extension() != ".exr") {
+    return fail(
+        Errc::kInvalidOption, "writing {}: the name must end in .png or .exr", out.string());
+  }
+
+  VENEER_ASSIGN(const render::Scene scene, render::Scene::load(scene_path));
+  VENEER_ASSIGN(const std::unique_ptr<btf::Material> material, btf::load_material(material_path));
+  VENEER_ASSIGN(const calibration::ProjectorProfile profile,
+                calibration::ProjectorProfile::load(profile_path));
+  options.compensate = !uncompensated;
+  VENEER_ASSIGN(const std::unique_ptr<render::Renderer> renderer,
+                render::Renderer::create(scene, *material, profile, options));
+  renderer->draw({Eigen::Vector3d(eye[0], eye[1], eye[2]), scene.world_from_object, 0});
+  renderer->finish();
+  const int width = profile.geometry.width;
+  const int height = profile.geometry.height;
+  if (out.extension() == ".exr") {
+    Image<Rgb32f> target(width, height);
+    renderer->read_target(target.view());
+    VENEER_TRY(write_exr(out, target.view(), {"X", "Y", "Z"}));
+  } else {
+    Image<Rgb16> codes(width, height);
+    renderer->read_codes(codes.view());
+    // A picture for people: codes of any depth spread over the file's 16 bits.
+    const double scale = 65535.0 / ((1U << static_cast<unsigned>(profile.bits)) - 1);
+    for (Rgb16& pixel : codes.pixels()) {
+      for (std::uint16_t& code : pixel)
+        code = static_cast<std::uint16_t>(std::lround(code * scale));
+    }
+    VENEER_TRY(write_png(out, codes.view()));
+  }
+  const render::FrameStatistics statistics = renderer->statistics();
+  line.print({{"frame", out.string()},
+              {"covered_pixels", statistics.covered_pixels},
+              {"out_of_gamut_pixels", statistics.out_of_gamut_pixels},
+              {"out_of_reach_pixels", statistics.out_of_reach_pixels}},
+             fmt::format("wrote {}: {} pixels covered, {} out of gamut",
+                         out.string(),
+                         statistics.covered_pixels,
+                         statistics.out_of_gamut_pixels));
+  return kExitDone;
+}
+
+}  // namespace veneer::cli

@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/report/verification.h"
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <sstream>
+
+#include "base/clock.h"
+#include "base/files.h"
+#include "base/image_files.h"
+#include "base/statistics.h"
+#include "base/toml_reader.h"
+#include "btf/interpolated_set.h"
+#include "cli/report/pictures.h"
+#include "render/scene.h"
+#include "simulation/bench/material.h"
+#include "tracking/drivers/simulated/path.h"
+
+namespace veneer::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using Eigen::Vector3d;
+using nlohmann::json;
+using simulation::Bench;
+using simulation::BenchLight;
+
+/// A frame that veneerd wrote.
+struct RecordedFrame {
+  std::uint64_t number = 0;
+  Duration display_time{};
+  fs::path file;
+};
+
+Result<std::vector<RecordedFrame>> read_frames(const fs::path& folder) {
+  VENEER_ASSIGN(const std::string text, read_text(folder / "frames.jsonl"));
+  std::vector<RecordedFrame> frames;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    try {
+      const json entry = json::parse(line);
+      frames.push_back({entry.at("frame"),
+                        Duration{entry.at("display_time_ns").get<Duration::rep>()},
+                        folder / entry.at("file").get<std::string>()});
+    } catch (const json::exception& error) {
+      return fail(Errc::kBadFormat,
+                  "reading {}, line {}: {}",
+                  (folder / "frames.jsonl").string(),
+                  frames.size() + 1,
+                  error.what());
+    }
+  }
+  return frames;
+}
+
+/// Where the bodies of a simulated tracker truly were.
+class GroundTruth {
+ public:
+  static Result<GroundTruth> read(const fs::path& run_folder) {
+    GroundTruth truth;
+    VENEER_ASSIGN(TomlReader toml, TomlReader::open(run_folder / "veneer.toml"));
+    TomlReader tracker = toml.table("tracker");
+    std::string driver;
+    tracker.read("driver", driver);
+    if (driver != "simulated") {
+      return fail(
+          Errc::kInvalidOption,
+          "verifying {}: only a run with the simulated tracker knows where the eye truly was",
+          run_folder.string());
+    }
+    for (TomlReader& table : tracker.tables("path")) {
+      VENEER_ASSIGN(tracking::Path path, tracking::Path::read(table));
+      truth.paths_.emplace(path.body(), path);
+    }
+    VENEER_ASSIGN(const std::string summary, read_text(run_folder / "run.json"));
+    const json parsed = json::parse(summary, nullptr, false);
+    if (!parsed.is_object() || !parsed.contains("tracker_start_ns")) {
+      return fail(Errc::kBadFormat,
+                  "reading {}: it is no summary of a run",
+                  (run_folder / "run.json").string());
+    }
+    truth.start_ = Duration{parsed["tracker_start_ns"].get<Duration::rep>()};
+    return truth;
+  }
+
+  /// A body that nobody scripted does not move.
+  [[nodiscard]] RigidTransform world_from_body(tracking::BodyId body, Duration when) const {
+    const auto found = paths_.find(body);
+    return found == paths_.end() ? RigidTransform{} : found->second.at(to_seconds(when - start_));
+  }
+
+ private:
+  std::map<tracking::BodyId, tracking::Path> paths_;
+  Duration start_{};
+};
+
+std::vector<BenchLight> bench_lights(const std::vector<render::Light>& lights) {
+  std::vector<BenchLight> result;
+  for (const render::Light& light : lights) {
+    if (const auto* directional = std::get_if<render::DirectionalLight>(&light)) {
+      result.push_back({BenchLight::Kind::kDirectional,
+                        directional->direction_to_light,
+                        directional->illuminance_rgb});
+    } else {
+      const auto& point = std::get<render::PointLight>(light);
+      result.push_back({BenchLight::Kind::kPoint, point.position, point.intensity_rgb});
+    }
+  }
+  return result;
+}
+
+/// The code values in a frame's file, undone as FileOutput made them.
+Result<Image<Rgb16>> read_codes(const fs::path& path, int bits) {
+  VENEER_ASSIGN(Image<Rgb16> image, read_png16(path));
+  const double scale = ((1U << static_cast<unsigned>(bits)) - 1) / 65535.0;
+  for (Rgb16& pixel : image.pixels()) {
+    for (std::uint16_t& code : pixel) code = static_cast<std::uint16_t>(std::lround(code * scale));
+  }
+  return image;
+}
+
+/// dE00 of the covered pixels, split by whether they are within gamut, over several frames.
+struct Pool {
+  std::vector<double> within_gamut;
+  std::vector<double> covered;
+
+  void add(const simulation::Comparison& comparison) {
+    const auto de00 = comparison.de00.pixels();
+    for (std::size_t i = 0; i < de00.size(); ++i) {
+      if (std::isnan(de00[i])) continue;
+      covered.push_back(static_cast<double>(de00[i]));
+      if (comparison.in_gamut.pixels()[i] != 0)
+        within_gamut.push_back(static_cast<double>(de00[i]));
+    }
+  }
+};
+
+simulation::DifferenceStatistics statistics(const std::vector<double>& de00) {
+  simulation::DifferenceStatistics result;
+  result.count = static_cast<std::int64_t>(de00.size());
+  result.mean = mean(de00);
+  result.p95 = quantile(de00, 0.95);
+  result.max = quantile(de00, 1);
+  return result;
+}
+
+/// Differences with what is out of gamut taken out.
+Image<Rgb8> difference_picture(const simulation::Comparison& comparison) {
+  Image<float> de00 = comparison.de00;
+  for (std::size_t i = 0; i < de00.pixels().size(); ++i) {
+    if (comparison.in_gamut.pixels()[i] == 0) de00.pixels()[i] = std::nanf("");
+  }
+  return picture_of_differences(de00.view(), kDifferenceScale);
+}
+
+class PictureWriter {
+ public:
+  PictureWriter(fs::path folder, double white_luminance)
+      : folder_(std::move(folder)), white_luminance_(white_luminance) {}
+
+  [[nodiscard]] Status write(std::string_view kind,
+                             std::uint64_t frame,
+                             const Image<Rgb8>& picture) const {
+    if (folder_.empty()) return {};
+    return write_png(folder_ / fmt::format("{}-{:06}.png", kind, frame), picture.view());
+  }
+  [[nodiscard]] Status write_xyz(std::string_view kind,
+                                 std::uint64_t frame,
+                                 const Image<Rgb32f>& xyz) const {
+    return write(kind, frame, picture_of_xyz(xyz.view(), white_luminance_));
+  }
+
+ private:
+  fs::path folder_;
+  double white_luminance_;
+};
+
+}  // namespace
+
+Result<RunVerification> verify_run(const RecordedRun& run,
+                                   const VerificationOptions& options,
+                                   Progress& progress) {
+  if (options.every < 1)
+    return fail(Errc::kInvalidOption, "verifying: every {}-th frame makes no sense", options.every);
+  VENEER_ASSIGN(const render::Scene scene, render::Scene::load(run.folder / "scene.toml"));
+  VENEER_ASSIGN(const GroundTruth truth, GroundTruth::read(run.folder));
+  VENEER_ASSIGN(const std::vector<RecordedFrame> frames, read_frames(run.folder / run.frames));
+  VENEER_ASSIGN(const simulation::BenchTruth bench_truth,
+                simulation::BenchTruth::load(options.bench));
+  VENEER_ASSIGN(const std::unique_ptr<Bench> bench, Bench::create(bench_truth, scene.mesh));
+  VENEER_ASSIGN(btf::SampleSet set, btf::SampleSet::open(options.set));
+  const btf::InterpolatedSet interpolated(std::move(set));
+  const simulation::TexelSource material = simulation::texel_source(interpolated);
+  const std::vector<BenchLight> lights = bench_lights(scene.lights);
+  VENEER_ASSIGN(const Xyz white, bench->white(scene.world_from_object));
+  const PictureWriter pictures(options.pictures, white.y());
+  const int bits = bench_truth.projector.bits;
+
+  RunVerification result;
+  Pool pool;
+  Pool uncompensated_pool;
+  const auto count = (static_cast<std::int64_t>(frames.size()) + options.every - 1) / options.every;
+  progress.start("looking at frames on the virtual bench", count);
+  for (std::size_t i = 0; i < frames.size(); i += static_cast<std::size_t>(options.every)) {
+    const RecordedFrame& frame = frames[i];
+    VerifiedFrame verified;
+    verified.number = frame.number;
+    verified.eye_in_world =
+        truth.world_from_body(scene.observer_body, frame.display_time) * scene.eye_in_sensor;
+    const RigidTransform world_from_object =
+        scene.object_body < 0 ? scene.world_from_object
+                              : truth.world_from_body(scene.object_body, frame.display_time) *
+                                    scene.world_from_object;
+
+    VENEER_ASSIGN(const simulation::EyeView view,
+                  bench->look(world_from_object, verified.eye_in_world));
+    const Image<Rgb32f> target =
+        bench->material_truth(view, material, scene.texture_repeats, lights);
+    VENEER_ASSIGN(const Image<Rgb16> codes, read_codes(frame.file, bits));
+    VENEER_ASSIGN(const Image<Rgb32f> received, bench->observe(view, codes.view()));
+    VENEER_ASSIGN(const simulation::Comparison comparison, bench->compare(view, target, received));
+    pool.add(comparison);
+    verified.within_gamut = comparison.within_gamut;
+    verified.covered = comparison.covered;
+    verified.in_gamut_fraction = comparison.in_gamut_fraction;
+    result.partial += comparison.partial;
+    result.unlit += comparison.unlit;
+    result.target_over_white += comparison.target_over_white;
+    VENEER_TRY(pictures.write("projector", frame.number, picture_of_codes(codes.view(), bits)));
+    VENEER_TRY(pictures.write_xyz("target", frame.number, target));
+    VENEER_TRY(pictures.write_xyz("received", frame.number, received));
+    VENEER_TRY(pictures.write("difference", frame.number, difference_picture(comparison)));
+
+    if (!run.uncompensated.empty()) {
+      const fs::path file = run.folder / run.uncompensated / frame.file.filename();
+      VENEER_ASSIGN(const Image<Rgb16> raw_codes, read_codes(file, bits));
+      VENEER_ASSIGN(const Image<Rgb32f> raw, bench->observe(view, raw_codes.view()));
+      VENEER_ASSIGN(const simulation::Comparison raw_comparison, bench->compare(view, target, raw));
+      uncompensated_pool.add(raw_comparison);
+      verified.uncompensated_mean = raw_comparison.within_gamut.mean;
+      VENEER_TRY(pictures.write_xyz("uncompensated", frame.number, raw));
+      VENEER_TRY(pictures.write(
+          "uncompensated_difference", frame.number, difference_picture(raw_comparison)));
+    }
+    result.frames.push_back(verified);
+    progress.advance(1);
+  }
+  result.within_gamut = statistics(pool.within_gamut);
+  result.covered = statistics(pool.covered);
+  result.uncompensated = statistics(uncompensated_pool.within_gamut);
+  result.in_gamut_fraction = pool.covered.empty() ? 0
+                                                  : static_cast<double>(pool.within_gamut.size()) /
+                                                        static_cast<double>(pool.covered.size());
+  progress.finish(fmt::format(
+      "dE00 {:.2f} mean, {:.2f} at 95 %", result.within_gamut.mean, result.within_gamut.p95));
+  return result;
+}
+
+}  // namespace veneer::cli

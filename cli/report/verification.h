@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/progress.h"
+#include "base/result.h"
+#include "simulation/bench.h"
+
+namespace veneer::cli {
+
+/// A finished run of veneerd: its folder holds the configuration, the scene, the summary and, in
+/// sub-folders, the frames it wrote.
+struct RecordedRun {
+  std::filesystem::path folder;
+  std::string frames = "frames";  ///< sub-folder of frames.jsonl and the pictures it names
+  std::string uncompensated;      ///< the same walk without compensation; none where empty
+};
+
+struct VerificationOptions {
+  std::filesystem::path bench;  ///< bench.toml, the hidden truth
+  std::filesystem::path set;    ///< the sample set that the material was fitted to
+  /// Looks at every n-th recorded frame. >= 1.
+  int every = 1;
+  /// Folder to which pictures of each looked-at frame are written; none where empty.
+  std::filesystem::path pictures;
+};
+
+/// One frame as the eye received it.
+struct VerifiedFrame {
+  std::uint64_t number = 0;
+  Eigen::Vector3d eye_in_world = Eigen::Vector3d::Zero();  ///< true, at the moment of display
+  simulation::DifferenceStatistics within_gamut;
+  simulation::DifferenceStatistics covered;
+  double in_gamut_fraction = 0;
+  std::optional<double> uncompensated_mean;  ///< dE00 in gamut of the run without compensation
+};
+
+/// All looked-at frames; pixels of all frames weigh alike.
+struct RunVerification {
+  std::vector<VerifiedFrame> frames;
+  simulation::DifferenceStatistics within_gamut;
+  simulation::DifferenceStatistics covered;
+  simulation::DifferenceStatistics uncompensated;  ///< in gamut; count 0 where there is no such run
+  double in_gamut_fraction = 0;
+  std::int64_t partial = 0;            ///< pixels left out: on an edge
+  std::int64_t unlit = 0;              ///< pixels left out: beyond the projector's reach
+  std::int64_t target_over_white = 0;  ///< covered pixels whose target has L* > 100
+};
+
+/// dE00 that the pictures of differences show as brightest.
+inline constexpr double kDifferenceScale = 10;
+
+/// Shows the frames of a run on the virtual bench, from the true place of the eye at the moment of
+/// display, and compares what is received with what the material would have sent.
+/// Errors: kNotFound, kBadFormat, kInvalidOption (a run with another tracker than the simulated
+/// one).
+[[nodiscard]] Result<RunVerification> verify_run(const RecordedRun& run,
+                                                 const VerificationOptions& options,
+                                                 Progress& progress);
+
+}  // namespace veneer::cli
