@@ -104,9 +104,9 @@ TEST_F(SynthesizeTest, EveryMaterialIsFiniteAndNotBlack) {
 }
 
 // Run by the test below in processes of their own, since the number of threads is read once.
-TEST(SynthesizeInAnotherProcess, WritesWhereItIsTold) {
+TEST(SynthesizeInAnotherProcess, DISABLED_WritesWhereItIsTold) {
   const char* const out = std::getenv("VENEER_TEST_OUT");
-  if (out == nullptr) GTEST_SKIP() << "only a part of SynthesizeTest.IsTheSameOnAnyNumberOfThreads";
+  ASSERT_NE(out, nullptr);
   SilentProgress silent;
   SynthesisOptions options = quick_options();
   options.size = 8;
@@ -123,7 +123,8 @@ TEST_F(SynthesizeTest, IsTheSameOnAnyNumberOfThreads) {
     const fs::path out = folder_ / threads;
     const std::string command =
         "VENEER_THREADS=" + threads + " VENEER_TEST_OUT='" + out.string() + "' '" + program +
-        "' --gtest_filter=SynthesizeInAnotherProcess.* > '" + (folder_ / "log").string() + "'";
+        "' --gtest_also_run_disabled_tests --gtest_filter=SynthesizeInAnotherProcess.* > '" +
+        (folder_ / "log").string() + "'";
     ASSERT_EQ(std::system(command.c_str()), 0) << command;
     results.push_back(bytes_of(out / "samples.safetensors"));
   }
