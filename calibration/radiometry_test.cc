@@ -133,6 +133,48 @@ TEST(MeasureProfile, FindsTheTruthWithoutNoise) {
           << "channel " << c << " code " << code;
 }
 
+TEST(MeasureProfile, FindsTheVignettingInALightRoom) {
+  FakeProjector projector;
+  projector.ambient = {150, 160, 140};
+  const auto measured = projector.measure();
+  ASSERT_TRUE(measured) << measured.error().what;
+  const Image<float>& map = measured->profile.vignetting;
+  const double reference = projector.intensity({320, 240});
+  for (int y = 0; y < map.height(); ++y)
+    for (int x = 0; x < map.width(); ++x) {
+      const Eigen::Vector2d pixel((x + 0.5) / map.width() * 640, (y + 0.5) / map.height() * 480);
+      // Cubics through a parabola are exact; the rim beyond the outermost spots is a straight line.
+      const bool rim = (pixel - Eigen::Vector2d(320, 240)).cwiseAbs().x() > 300 ||
+                       (pixel - Eigen::Vector2d(320, 240)).cwiseAbs().y() > 225;
+      EXPECT_NEAR(map(x, y), projector.intensity(pixel) / reference, rim ? 2e-3 : 1e-6)
+          << x << ' ' << y;
+    }
+}
+
+TEST(MeasureProfile, DoesNotOvershootAStep) {
+  FakeProjector projector;
+  projector.drive_hook = [](Eigen::Vector3d d) {
+    for (double& drive : d) drive = drive < 0.5 ? 0.3 * drive : 0.7 + 0.6 * (drive - 0.5);
+    return d;
+  };
+  const auto measured = projector.measure();
+  ASSERT_TRUE(measured) << measured.error().what;
+  const std::vector<double>& curve = measured->profile.tone_curves[0];
+  const std::vector<std::uint16_t> levels = ramp_codes(8, RadiometryOptions{}.levels);
+  std::size_t below = 0;
+  for (const std::size_t level : levels) {
+    for (std::size_t code = below; code < level; ++code) {
+      EXPECT_GE(curve[code], curve[below]) << code;
+      EXPECT_LT(curve[code], curve[level] + 1e-12) << code;
+      // A curve that overshot and was cut would be flat here.
+      if (code + 1 < level && curve[level] > curve[below] + 1e-6) {
+        EXPECT_LT(curve[code], curve[level]) << code;
+      }
+    }
+    below = level;
+  }
+}
+
 TEST(MeasureProfile, PredictsPatchesItHasNotSeen) {
   FakeProjector projector;
   const auto measured = projector.measure();

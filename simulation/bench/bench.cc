@@ -31,10 +31,16 @@ Spectrum ambient_spectrum(const RoomTruth& room) {
   return shape * (room.ambient_nits / xyz_of(shape).y());
 }
 
-Eigen::Vector3d eye_ray(const EyeTruth& eye, double x, double y) {
-  const double half = std::tan(0.5 * to_radians(Degrees{eye.vertical_fov_deg}).value);
-  const double pixel = 2.0 * half / eye.height;
-  return {(x - 0.5 * eye.width) * pixel, (y - 0.5 * eye.height) * pixel, 1.0};
+/// The length of an eye pixel's side at distance 1 along the line of sight.
+double eye_pixel(const EyeTruth& eye) {
+  return 2.0 * std::tan(0.5 * to_radians(Degrees{eye.vertical_fov_deg}).value) / eye.height;
+}
+
+/// @param hits, reached  rays of the pixel that met the object, and those of them within reach.
+Coverage coverage_of(int rays, int hits, int reached) {
+  if (hits == 0) return Coverage::kOutside;
+  if (hits == rays && reached == 0) return Coverage::kUnlit;
+  return reached == rays ? Coverage::kCovered : Coverage::kPartial;
 }
 
 }  // namespace
@@ -113,28 +119,22 @@ Result<EyeView> Bench::look(const RigidTransform& world_from_object,
   std::vector<std::vector<EyeSample>> rows(static_cast<std::size_t>(eye.height));
   view.first.assign(view.coverage.pixels().size() + 1, 0);
 
+  const double pixel_side = eye_pixel(eye);
   const auto trace_pixel = [&](int x, int y, std::vector<EyeSample>& row) {
-    int on_object = 0;
+    int hits = 0;
     int reached = 0;
     for (int j = 0; j < eye.samples; ++j)
       for (int i = 0; i < eye.samples; ++i) {
-        const Eigen::Vector3d ray =
-            eye_ray(eye, x + (i + 0.5) / eye.samples, y + (j + 0.5) / eye.samples);
+        const Eigen::Vector3d ray((x + (i + 0.5) / eye.samples - 0.5 * eye.width) * pixel_side,
+                                  (y + (j + 0.5) / eye.samples - 0.5 * eye.height) * pixel_side,
+                                  1.0);
         const auto hit = state_->mesh.trace(view.eye_in_object, object_from_eye.rotation * ray);
         if (!hit) continue;
         row.push_back(state_->light(*hit, world_from_object, lens_in_object));
-        ++on_object;
+        ++hits;
         if (row.back().geometry >= geometry_floor) ++reached;
       }
-    if (on_object == 0) return;
-    Coverage& coverage = view.coverage(x, y);
-    if (on_object < view.rays_per_pixel) {
-      coverage = Coverage::kPartial;
-    } else if (reached == 0) {
-      coverage = Coverage::kUnlit;
-    } else {
-      coverage = reached < view.rays_per_pixel ? Coverage::kPartial : Coverage::kCovered;
-    }
+    view.coverage(x, y) = coverage_of(view.rays_per_pixel, hits, reached);
   };
   parallel_for(eye.height, 1, [&](std::int64_t begin, std::int64_t end) {
     for (auto y = static_cast<std::size_t>(begin); y < static_cast<std::size_t>(end); ++y)

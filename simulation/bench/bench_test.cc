@@ -129,6 +129,29 @@ TEST(Bench, AnEyeAtTheLensSeesTheFrameAsItIs) {
   }
 }
 
+TEST(Bench, APlateInTheBoardsPlaceSendsWhatTheColorimeterReads) {
+  BenchTruth truth = plain_truth();
+  ProjectorTruth& p = truth.projector;
+  p.focal_px = {40, 40};  // wide, so that slant, distance and vignetting matter
+  p.vignetting_exponent = 4;
+  p.vignetting_drop = 0.2;
+  p.vignetting_off_centre = {0.1, -0.2};
+  p.black_fraction = 0.01;
+  truth.room.ambient_nits = 5;
+  truth.object.wavelength_nm = {400, 700};
+  truth.object.reflectance = {0.5, 0.9};
+  truth.eye.vertical_fov_deg = 2 * std::atan(24.0 / 40) * 180 / std::numbers::pi;
+  truth.eye.samples = 3;
+  const auto bench = make_bench(truth, square(2));
+  const Image<Rgb32f> picture = observe(*bench, look(*bench), {200, 150, 100});
+  for (int y = 0; y < 48; y += 5)
+    for (int x = 0; x < 64; x += 5) {
+      const Xyz read = bench->board({200, 150, 100}, {x + 0.5, y + 0.5}, true, true);
+      // The pixel's mean against its middle: G is curved.
+      EXPECT_TRUE(picture(x, y).cast<double>().isApprox(read, 1e-3)) << x << ' ' << y;
+    }
+}
+
 TEST(Bench, TheEdgeOfThePixelsFootprintIsAveraged) {
   BenchTruth truth = plain_truth();
   truth.eye.samples = 4;
@@ -221,12 +244,14 @@ TEST(Bench, EveryDriveIsReachableAndMoreThanWhiteIsNot) {
   const auto bench = make_bench(truth, square(0.3));
   const EyeView view = look(*bench, turned(35, Eigen::Vector3d::UnitX()), {0.2, 0.1, 1});
   Pcg32 random(10);
+  const Image<Rgb32f> dark = observe(*bench, view, {0, 0, 0});
+  const Image<Rgb32f> white = observe(*bench, view, kFull);
+  const Xyz ambient = bench->board({}, {0, 0}, false, true);
   int tried = 0;
   for (int trial = 0; trial < 20; ++trial) {
     Rgb16 code{};
     for (auto& value : code) value = static_cast<std::uint16_t>(256 * random.uniform());
     const Image<Rgb32f> picture = observe(*bench, view, code);
-    const Image<Rgb32f> white = observe(*bench, view, kFull);
     for (int y = 4; y < 48; y += 7)
       for (int x = 4; x < 64; x += 7) {
         if (view.coverage(x, y) != Coverage::kCovered) continue;
@@ -237,7 +262,8 @@ TEST(Bench, EveryDriveIsReachableAndMoreThanWhiteIsNot) {
         geometry /= view.rays_per_pixel;
         EXPECT_TRUE(bench->reachable(picture(x, y).cast<double>(), geometry)) << x << ' ' << y;
         EXPECT_FALSE(bench->reachable(1.05 * white(x, y).cast<double>(), geometry));
-        EXPECT_FALSE(bench->reachable(Xyz::Zero(), geometry)) << "darker than black and ambient";
+        const Xyz half_black = 0.5 * (dark(x, y).cast<double>() + ambient);
+        EXPECT_FALSE(bench->reachable(half_black, geometry)) << "darker than black";
         ++tried;
       }
   }

@@ -30,8 +30,8 @@ Result<Xyz> VirtualColorimeter::read(calibration::Target target, const Eigen::Ve
                 pixel.y());
   const Xyz light =
       bench_.board(display_.code(), pixel, display_.lit(), target == calibration::Target::kObject);
-  const double gain = 1.0 + options_.relative_noise * random_.normal();
-  Xyz reading = gain * light;
+  Xyz reading = light;
+  for (double& value : reading) value *= 1.0 + options_.relative_noise * random_.normal();
   for (double& value : reading) value += options_.dark_noise_nits * random_.normal();
   return reading;
 }

@@ -29,7 +29,7 @@ class VirtualPatchDisplay final : public calibration::PatchDisplay {
 };
 
 struct VirtualColorimeterOptions {
-  /// Standard deviation of a reading, in parts of it.
+  /// Standard deviation of each of X, Y, Z, in parts of it.
   double relative_noise = 0.001;
   /// Standard deviation of each of X, Y, Z in the dark, cd/m^2.
   double dark_noise_nits = 0.002;
