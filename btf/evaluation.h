@@ -20,16 +20,19 @@ struct ImageError {
 struct Evaluation {
   ImageError linear;   ///< in linear light, both sides cut to [0, 1]
   ImageError encoded;  ///< after cutting to [0, 1] and the exponent 1/2.2, as the tables are
-  double psnr_db{};    ///< of the encoded values
+  double psnr_db{};    ///< of the encoded values; infinite where they are equal
   double
-      de00_mean{};  ///< CIEDE2000, samples as sRGB, white = sample 1; over a fixed subset of pairs
+      de00_mean{};  ///< CIEDE2000, samples cut to [0, 1] as sRGB, white = sample 1; a fixed subset
   double de00_p95{};
-  double drawn_epsilon_avg{};  ///< encoded, as the shader draws at the measured directions
+  double
+      drawn_epsilon_avg{};  ///< encoded, as the shader draws at the measured directions; a subset
   double bytes_per_texel{};
   int fetches{};
 };
 
-/// Errors: kBadFormat where material and set differ in size or directions.
+/// The same figures each time, on any number of threads. Of a polarised set the total is compared.
+/// Errors: kBadFormat where material and set differ in size or directions, or where one of them
+/// holds NaN or infinite values.
 [[nodiscard]] Result<Evaluation> evaluate(const SampleSet& set,
                                           const Material& material,
                                           Progress& progress);

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "btf/evaluation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/colour.h"
+#include "base/parallel.h"
+#include "base/random.h"
+
+namespace veneer::btf {
+namespace {
+
+// The exponent of the literature's tables.
+constexpr float kEncodingExponent = 1.0F / 2.2F;
+// Enough colour differences for a mean and a percentile that are steady to about half a percent.
+constexpr std::int64_t kColourSamples = 200'000;
+constexpr std::int64_t kDrawnTexels = 64;
+constexpr std::int64_t kDrawnSamples = 200'000;
+// Texels are summed in this many groups, each in order, so that rounding does not depend on
+// threads.
+constexpr std::int64_t kGroups = 64;
+
+// Sums over the texels of one group.
+struct Sums {
+  Eigen::ArrayXd linear;  // of |difference| for each pair, over channels
+  Eigen::ArrayXd encoded;
+  double linear_squares = 0.0;
+  double encoded_squares = 0.0;
+};
+
+Eigen::ArrayXf encode(const Eigen::ArrayXf& linear) { return linear.pow(kEncodingExponent); }
+
+double encode(double linear) {
+  return std::pow(std::clamp(linear, 0.0, 1.0), static_cast<double>(kEncodingExponent));
+}
+
+bool same_directions(const DirectionSet& a, const DirectionSet& b) {
+  return std::equal(
+      a.begin(), a.end(), b.begin(), b.end(), [](const Direction& x, const Direction& y) {
+        return (x - y).norm() < kEqualDirections;
+      });
+}
+
+Status check_match(const SampleSet& set, const Material& material) {
+  const SampleSetInfo& info = set.info();
+  const std::string doing = fmt::format("evaluating a material on {}", set.path().string());
+  if (material.width() != info.width || material.height() != info.height)
+    return fail(Errc::kBadFormat,
+                "{}: the material has {} x {} texels, the set {} x {}; fit it on this set",
+                doing,
+                material.width(),
+                material.height(),
+                info.width,
+                info.height);
+  if (!same_directions(material.views(), info.views) ||
+      !same_directions(material.lights(), info.lights))
+    return fail(Errc::kBadFormat,
+                "{}: the material was fitted at other directions; fit it on this set",
+                doing);
+  return {};
+}
+
+// Pairs to look at in one texel: all of them where there are few, else drawn at random from the
+// texel's own sequence.
+std::vector<int> choose_pairs(int pair_count, std::int64_t wanted, std::uint64_t texel) {
+  std::vector<int> pairs(static_cast<std::size_t>(std::min<std::int64_t>(wanted, pair_count)));
+  if (wanted >= pair_count) {
+    std::iota(pairs.begin(), pairs.end(), 0);
+    return pairs;
+  }
+  Pcg32 random(texel);
+  for (int& pair : pairs) pair = static_cast<int>(random.uniform() * pair_count);
+  return pairs;
+}
+
+Lab lab_of(const Eigen::Vector3d& srgb) {
+  static const Xyz kWhite = xyz_from_srgb() * Eigen::Vector3d::Ones();
+  return lab_from_xyz(xyz_from_srgb() * srgb, kWhite);
+}
+
+ImageError image_error(const Eigen::ArrayXd& sums, double squares, const SampleSetInfo& info) {
+  const double per_image = 3.0 * info.texel_count();
+  return {sums.mean() / per_image,
+          sums.minCoeff() / per_image,
+          sums.maxCoeff() / per_image,
+          std::sqrt(squares / (per_image * static_cast<double>(sums.size())))};
+}
+
+double drawn_epsilon(const SampleSet& set, const Material& material, Progress& progress) {
+  const SampleSetInfo& info = set.info();
+  const std::int64_t texels = std::min<std::int64_t>(kDrawnTexels, info.texel_count());
+  const std::int64_t per_texel = std::max<std::int64_t>(kDrawnSamples / texels, 1);
+  std::vector<double> means(static_cast<std::size_t>(texels));
+  progress.start("comparing as drawn", texels);
+  parallel_for(texels, 1, [&](std::int64_t begin, std::int64_t end) {
+    std::vector<float> rgb(static_cast<std::size_t>(info.pair_count()) * 3);
+    for (std::int64_t i = begin; i < end; ++i) {
+      const auto texel = static_cast<int>(i * info.texel_count() / texels);
+      set.rgb(texel, Part::kTotal, rgb);
+      const std::vector<int> pairs =
+          choose_pairs(info.pair_count(), per_texel, static_cast<std::uint64_t>(texel));
+      double sum = 0.0;
+      for (const int pair : pairs) {
+        const auto index = static_cast<std::size_t>(pair);
+        const Eigen::Vector3d drawn = material.radiance(
+            texel, info.views[index / info.lights.size()], info.lights[index % info.lights.size()]);
+        for (std::size_t c = 0; c < 3; ++c)
+          sum += std::abs(encode(drawn[static_cast<Eigen::Index>(c)]) -
+                          encode(static_cast<double>(rgb[index * 3 + c])));
+      }
+      means[static_cast<std::size_t>(i)] = sum / (3.0 * static_cast<double>(pairs.size()));
+      progress.advance();
+    }
+  });
+  return std::accumulate(means.begin(), means.end(), 0.0) / static_cast<double>(texels);
+}
+
+}  // namespace
+
+Result<Evaluation> evaluate(const SampleSet& set, const Material& material, Progress& progress) {
+  VENEER_TRY(check_match(set, material));
+  VENEER_TRY(set.check_finite());
+  const SampleSetInfo& info = set.info();
+  const Eigen::Index pairs = info.pair_count();
+  const std::int64_t texels = info.texel_count();
+  const std::int64_t group_count = std::min(kGroups, texels);
+  const std::int64_t colours_per_texel =
+      std::min<std::int64_t>((kColourSamples + texels - 1) / texels, pairs);
+  std::vector<Sums> groups(static_cast<std::size_t>(group_count));
+  std::vector<double> differences(static_cast<std::size_t>(texels * colours_per_texel));
+  std::vector<int> non_finite(static_cast<std::size_t>(group_count), 0);
+
+  progress.start("comparing", texels);
+  parallel_for(group_count, 1, [&](std::int64_t first_group, std::int64_t last_group) {
+    Eigen::ArrayXf measured(pairs * 3);
+    Eigen::ArrayXf modelled(pairs * 3);
+    for (std::int64_t g = first_group; g < last_group; ++g) {
+      Sums& sums = groups[static_cast<std::size_t>(g)];
+      sums.linear = sums.encoded = Eigen::ArrayXd::Zero(pairs);
+      for (std::int64_t t = g * texels / group_count; t < (g + 1) * texels / group_count; ++t) {
+        const auto texel = static_cast<int>(t);
+        set.rgb(texel, Part::kTotal, {measured.data(), static_cast<std::size_t>(measured.size())});
+        material.reconstruct(texel, {modelled.data(), static_cast<std::size_t>(modelled.size())});
+        if (!modelled.allFinite()) ++non_finite[static_cast<std::size_t>(g)];
+        measured = measured.max(0.0F).min(1.0F);
+        modelled = modelled.max(0.0F).min(1.0F);
+        const auto add =
+            [pairs](const Eigen::ArrayXf& difference, Eigen::ArrayXd& sum, double& squares) {
+              sum += Eigen::Map<const Eigen::Array3Xf>(difference.data(), 3, pairs)
+                         .abs()
+                         .colwise()
+                         .sum()
+                         .transpose()
+                         .cast<double>();
+              squares += difference.cast<double>().square().sum();
+            };
+        add(measured - modelled, sums.linear, sums.linear_squares);
+        add(encode(measured) - encode(modelled), sums.encoded, sums.encoded_squares);
+        auto out = differences.begin() + t * colours_per_texel;
+        for (const int pair : choose_pairs(
+                 static_cast<int>(pairs), colours_per_texel, static_cast<std::uint64_t>(t))) {
+          const Eigen::Vector3f a = measured.segment<3>(Eigen::Index{3} * pair);
+          const Eigen::Vector3f b = modelled.segment<3>(Eigen::Index{3} * pair);
+          *out++ = delta_e_2000(lab_of(a.cast<double>()), lab_of(b.cast<double>()));
+        }
+        progress.advance();
+      }
+    }
+  });
+  if (const int count = std::accumulate(non_finite.begin(), non_finite.end(), 0); count > 0) {
+    progress.finish();
+    return fail(
+        Errc::kBadFormat,
+        "evaluating a material on {}: it gives NaN or infinite values at {} texels; fit it again",
+        set.path().string(),
+        count);
+  }
+
+  Sums total = std::move(groups.front());
+  for (std::size_t g = 1; g < groups.size(); ++g) {
+    total.linear += groups[g].linear;
+    total.encoded += groups[g].encoded;
+    total.linear_squares += groups[g].linear_squares;
+    total.encoded_squares += groups[g].encoded_squares;
+  }
+  Evaluation result;
+  result.linear = image_error(total.linear, total.linear_squares, info);
+  result.encoded = image_error(total.encoded, total.encoded_squares, info);
+  result.psnr_db = result.encoded.rmse > 0.0 ? -20.0 * std::log10(result.encoded.rmse)
+                                             : std::numeric_limits<double>::infinity();
+  result.de00_mean = std::accumulate(differences.begin(), differences.end(), 0.0) /
+                     static_cast<double>(differences.size());
+  const auto p95 = differences.begin() +
+                   static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(differences.size() - 1));
+  std::nth_element(differences.begin(), p95, differences.end());
+  result.de00_p95 = *p95;
+  result.drawn_epsilon_avg = drawn_epsilon(set, material, progress);
+  const ModelShader shader = material.shader();
+  result.bytes_per_texel = static_cast<double>(shader.gpu_bytes()) / static_cast<double>(texels);
+  result.fetches = shader.fetches;
+  progress.finish(fmt::format("epsilon {:.4f}", result.encoded.epsilon_avg));
+  return result;
+}
+
+}  // namespace veneer::btf
