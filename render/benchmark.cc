@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/benchmark.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <numbers>
+#include <optional>
+#include <string_view>
+
+#include "base/clock.h"
+#include "base/random.h"
+#include "render/compensate_pass.h"
+#include "render/draw_pass.h"
+#include "render/egl_context.h"
+
+namespace veneer::render {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr int kPlainTexels = 256;  // along a side of the plain texture
+constexpr int kWarmUpFrames = 2;
+constexpr std::string_view kQueryClock = "GL timer query";
+constexpr std::string_view kFinishClock = "steady clock around glFinish";
+
+constexpr char kPlainGlsl[] =
+#include "render/shaders/plain.glsl.inc"
+    ;
+
+// A projector at the origin and, half a metre off, a surface that fills its raster and a little
+// more. The machine itself is the simplest there is; what it shows is of no interest here.
+calibration::ProjectorProfile bench_profile(int width, int height) {
+  calibration::ProjectorProfile profile;
+  profile.geometry.width = width;
+  profile.geometry.height = height;
+  profile.geometry.fx = profile.geometry.fy = 1.5 * width;
+  profile.geometry.cx = 0.5 * width;
+  profile.geometry.cy = 0.5 * height;
+  profile.reference_distance_m = 0.5;
+  profile.primaries = 300.0 * xyz_from_srgb();
+  for (auto& curve : profile.tone_curves) {
+    for (int code = 0; code < 256; ++code) curve.push_back(std::pow(code / 255.0, 2.2));
+  }
+  return profile;
+}
+
+// The point of the surface that is seen at (x, y), which run over the raster from 0 to 1.
+Vector3d surface_point(const calibration::ProjectorGeometry& g, double x, double y) {
+  const double bulge = std::cos(3.0 * (x - 0.5)) * std::cos(3.0 * (y - 0.5));
+  const double depth = 0.5 - 0.05 * bulge;
+  return depth * Vector3d((x * g.width - g.cx) / g.fx, (y * g.height - g.cy) / g.fy, 1.0);
+}
+
+Mesh frame_filling_mesh(const calibration::ProjectorGeometry& g) {
+  constexpr int kColumns = 64;
+  constexpr int kRows = 48;
+  constexpr double kMargin = 0.02;
+  constexpr double kStep = 1e-5;
+  Mesh mesh;
+  for (int j = 0; j <= kRows; ++j) {
+    for (int i = 0; i <= kColumns; ++i) {
+      const double x = std::lerp(-kMargin, 1.0 + kMargin, static_cast<double>(i) / kColumns);
+      const double y = std::lerp(-kMargin, 1.0 + kMargin, static_cast<double>(j) / kRows);
+      const Vector3d right = surface_point(g, x + kStep, y) - surface_point(g, x - kStep, y);
+      const Vector3d down = surface_point(g, x, y + kStep) - surface_point(g, x, y - kStep);
+      mesh.positions.push_back(surface_point(g, x, y));
+      mesh.normals.push_back(down.cross(right).normalized());  // towards the projector
+      mesh.texture_coordinates.emplace_back(x, y);
+    }
+  }
+  const auto vertex = [](int i, int j) {
+    return static_cast<std::uint32_t>(j * (kColumns + 1) + i);
+  };
+  for (int j = 0; j < kRows; ++j) {
+    for (int i = 0; i < kColumns; ++i) {
+      mesh.triangles.push_back({vertex(i, j), vertex(i, j + 1), vertex(i + 1, j + 1)});
+      mesh.triangles.push_back({vertex(i, j), vertex(i + 1, j + 1), vertex(i + 1, j)});
+    }
+  }
+  return mesh;
+}
+
+btf::ModelShader plain_shader() {
+  btf::ModelTexture texture;
+  texture.sampler = "Albedo";
+  texture.format = btf::TexelFormat::kRgba16f;
+  texture.width = texture.height = kPlainTexels;
+  texture.linear = true;
+  Pcg32 random(1);
+  for (int i = 0; i < 4 * kPlainTexels * kPlainTexels; ++i) {
+    const Eigen::half value(static_cast<float>(random.uniform()));
+    const auto* bytes = reinterpret_cast<const std::byte*>(&value);
+    texture.data.insert(texture.data.end(), bytes, bytes + sizeof(value));
+  }
+  btf::ModelShader shader;
+  shader.source = kPlainGlsl;
+  shader.textures.push_back(std::move(texture));
+  shader.fetches = 1;
+  return shader;
+}
+
+double quantile(std::vector<double> values, double part) {
+  std::ranges::sort(values);
+  return values[static_cast<std::size_t>(part * static_cast<double>(values.size() - 1) + 0.5)];
+}
+
+// One thing to time: a draw, or the compensation of what was drawn before it.
+struct Entrant {
+  RenderTiming timing;
+  std::optional<DrawPass> pass;
+  std::vector<double> query_ms;
+  std::vector<double> finish_ms;
+};
+
+class Bench {
+ public:
+  static Result<Bench> create(EglContext context, const RenderBenchOptions& options) {
+    const calibration::ProjectorProfile profile = bench_profile(options.width, options.height);
+    const Compensation compensation(profile, {});
+    const Image<float> vignetting = vignetting_raster(profile);
+    VENEER_ASSIGN(CompensatePass compensate,
+                  CompensatePass::create(compensation, vignetting.view()));
+    Bench bench(std::move(context), profile, std::move(compensate));
+    VENEER_TRY(bench.add("plain", plain_shader(), kPlainTexels, kPlainTexels));
+    for (const auto& [name, material] : options.materials)
+      VENEER_TRY(bench.add(name, material->shader(), material->width(), material->height()));
+    bench.entrants_.emplace_back().timing.name = "compensation";
+    return bench;
+  }
+
+  RenderBenchResult run(int frames, Progress& progress) {
+    progress.start("timing", frames);
+    for (int frame = -kWarmUpFrames; frame < frames; ++frame) {
+      for (Entrant& entrant : entrants_) time(entrant, frame);
+      if (frame >= 0) progress.advance();
+    }
+    progress.finish();
+    return summary();
+  }
+
+ private:
+  Bench(EglContext context, calibration::ProjectorProfile profile, CompensatePass compensate)
+      : context_(std::move(context)),
+        profile_(std::move(profile)),
+        mesh_(frame_filling_mesh(profile_.geometry)),
+        target_(make_texture_2d(GL_RGBA16F, profile_.geometry.width, profile_.geometry.height)),
+        depth_(make_texture_2d(
+            GL_DEPTH_COMPONENT32F, profile_.geometry.width, profile_.geometry.height)),
+        framebuffer_(make_framebuffer()),
+        query_(make_query(GL_TIME_ELAPSED)),
+        compensate_(std::move(compensate)) {
+    glNamedFramebufferTexture(framebuffer_.id(), GL_COLOR_ATTACHMENT0, target_.id(), 0);
+    glNamedFramebufferTexture(framebuffer_.id(), GL_DEPTH_ATTACHMENT, depth_.id(), 0);
+  }
+
+  // Texels as large as pixels: as many repeats as the material has to be laid side by side for
+  // that.
+  Status add(const std::string& name, const btf::ModelShader& shader, int width, int height) {
+    const Light light = DirectionalLight{Vector3d(0.3, -0.4, -0.9).normalized(),
+                                         Vector3d::Constant(100.0 * std::numbers::pi)};
+    const Eigen::Vector2d repeats(static_cast<double>(profile_.geometry.width) / width,
+                                  static_cast<double>(profile_.geometry.height) / height);
+    auto pass = DrawPass::create(shader, {light}, repeats, profile_);
+    if (!pass) return fail_while(fmt::format("timing {}", name), pass.error());
+    Entrant& entrant = entrants_.emplace_back();
+    entrant.timing.name = name;
+    entrant.timing.fetches = shader.fetches;
+    entrant.timing.gpu_bytes = shader.gpu_bytes();
+    entrant.pass = std::move(*pass);
+    return {};
+  }
+
+  void time(Entrant& entrant, int frame) {
+    DrawInput input;
+    input.eye_in_world = Vector3d(0.2 * std::sin(0.3 * frame), -0.1, -0.2);
+    glFinish();
+    const auto start = std::chrono::steady_clock::now();
+    glBeginQuery(GL_TIME_ELAPSED, query_.id());
+    if (entrant.pass) {
+      glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
+      entrant.pass->draw(mesh_, input);
+    } else {
+      compensate_.run(target_.id(), static_cast<std::uint32_t>(frame));
+    }
+    glEndQuery(GL_TIME_ELAPSED);
+    glFinish();
+    const Duration elapsed = std::chrono::steady_clock::now() - start;
+    GLuint64 query_ns = 0;
+    glGetQueryObjectui64v(query_.id(), GL_QUERY_RESULT, &query_ns);
+    if (frame < 0) return;
+    entrant.finish_ms.push_back(1e3 * to_seconds(elapsed));
+    entrant.query_ms.push_back(1e-6 * static_cast<double>(query_ns));
+  }
+
+  // A query counts the GPU's work alone, so that it may be below the clock, by no more than the
+  // cost of issuing the commands; never above it. Software rasterisers have been seen to count only
+  // the part of a draw that runs on their worker threads.
+  [[nodiscard]] bool queries_are_plausible() const {
+    const std::string_view renderer = context_.description();
+    if (renderer.starts_with("llvmpipe") || renderer.starts_with("softpipe")) return false;
+    return std::ranges::all_of(entrants_, [](const Entrant& entrant) {
+      const double query = quantile(entrant.query_ms, 0.5);
+      return query > 0.0 && query <= 1.05 * quantile(entrant.finish_ms, 0.5);
+    });
+  }
+
+  [[nodiscard]] RenderBenchResult summary() const {
+    const bool use_queries = queries_are_plausible();
+    RenderBenchResult result;
+    result.renderer = context_.description();
+    result.clock = use_queries ? kQueryClock : kFinishClock;
+    for (const Entrant& entrant : entrants_) {
+      const std::vector<double>& ms = use_queries ? entrant.query_ms : entrant.finish_ms;
+      RenderTiming timing = entrant.timing;
+      timing.ms_median = quantile(ms, 0.5);
+      timing.ms_p95 = quantile(ms, 0.95);
+      result.timings.push_back(timing);
+    }
+    for (RenderTiming& timing : result.timings)
+      timing.ratio = timing.ms_median / result.timings.front().ms_median;
+    return result;
+  }
+
+  EglContext context_;  // first, so that it goes last
+  calibration::ProjectorProfile profile_;
+  MeshBuffers mesh_;
+  GlTexture target_;
+  GlTexture depth_;
+  GlFramebuffer framebuffer_;
+  GlQuery query_;
+  CompensatePass compensate_;
+  std::vector<Entrant> entrants_;
+};
+
+}  // namespace
+
+Status RenderBenchOptions::check() const {
+  if (std::min(width, height) < 16 || std::max(width, height) > 8192)
+    return fail(Errc::kInvalidOption,
+                "timing: the size is {} x {}; 16 to 8192 each can be timed",
+                width,
+                height);
+  if (frames < 3 || frames > 10000)
+    return fail(Errc::kInvalidOption, "timing: {} frames; 3 to 10000 can be timed", frames);
+  return {};
+}
+
+Result<RenderBenchResult> bench_render(const RenderBenchOptions& options, Progress& progress) {
+  VENEER_TRY(options.check());
+  VENEER_ASSIGN(EglContext context, EglContext::create());
+  VENEER_ASSIGN(Bench bench, Bench::create(std::move(context), options));
+  return bench.run(options.frames, progress);
+}
+
+}  // namespace veneer::render

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/progress.h"
+#include "base/result.h"
+#include "btf/material.h"
+
+namespace veneer::render {
+
+struct RenderBenchMaterial {
+  std::string name;  ///< as it is reported, such as "texel-colours 3+1"
+  std::shared_ptr<const btf::Material>
+      material;  ///< shared: the caller may time it in several runs
+};
+
+struct RenderBenchOptions {
+  /// Pixels. 16 to 8192 each.
+  int width = 1024;
+  int height = 768;
+  /// Timed draws of each material, after two that are not. 3 to 10000.
+  int frames = 40;
+  std::vector<RenderBenchMaterial> materials{};
+  [[nodiscard]] Status check() const;
+};
+
+/// What one draw of the whole frame costs.
+struct RenderTiming {
+  std::string name;
+  double ms_median = 0;
+  double ms_p95 = 0;
+  double ratio = 0;  ///< of the medians, to "plain"
+  int fetches = 0;   ///< texture fetches per pixel and light
+  std::size_t gpu_bytes = 0;
+};
+
+struct RenderBenchResult {
+  std::string renderer;  ///< GL renderer and version
+  std::string clock;     ///< what measured: "GL timer query" or "steady clock around glFinish"
+  std::vector<RenderTiming>
+      timings;  ///< "plain" first, then the materials in order, then "compensation"
+};
+
+/// Times drawing a curved mesh that covers the whole frame, texels about as large as pixels, one
+/// directional light, into half floats with depth. "plain" is the yardstick: the same mesh,
+/// interpolants and target, one filtered fetch times the light's cosine. All draws take turns
+/// within every frame, so that a change in the machine's load hits all alike. "compensation" is the
+/// full-screen pass that follows a draw in the renderer (with its counters); no material's figure
+/// contains it. The GL timer query is used where it is plausible, else glFinish and the clock.
+/// Errors: kInvalidOption, kUnavailable (no GL 4.5).
+[[nodiscard]] Result<RenderBenchResult> bench_render(const RenderBenchOptions& options,
+                                                     Progress& progress);
+
+}  // namespace veneer::render

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/benchmark.h"
+
+#include <gtest/gtest.h>
+
+#include "render/internal_testing.h"
+
+namespace veneer::render {
+namespace {
+
+TEST(RenderBench, RefusesSizesAndFrameCountsItCannotTime) {
+  EXPECT_EQ(RenderBenchOptions{.width = 8}.check().error().code, Errc::kInvalidOption);
+  EXPECT_EQ(RenderBenchOptions{.height = 10000}.check().error().code, Errc::kInvalidOption);
+  EXPECT_EQ(RenderBenchOptions{.frames = 0}.check().error().code, Errc::kInvalidOption);
+  EXPECT_TRUE(RenderBenchOptions{}.check());
+}
+
+TEST(RenderBench, TimesEveryMaterialAgainstPlain) {
+  RenderBenchOptions options{.width = 320, .height = 240, .frames = 7};
+  // Enough arithmetic that no noise hides it.
+  options.materials.push_back(
+      {"busy",
+       std::make_shared<ShaderMaterial>(
+           "vec3 x = view + light;"
+           "for (int i = 0; i < 400; ++i) x = fract(sin(x) * 43.7 + uv.xyx);"
+           "return x;")});
+  SilentProgress progress;
+  const auto result = bench_render(options, progress);
+  if (!result && result.error().code == Errc::kUnavailable) GTEST_SKIP() << result.error().what;
+  ASSERT_TRUE(result) << result.error().what;
+  ASSERT_EQ(result->timings.size(), 3U);
+  EXPECT_EQ(result->timings[0].name, "plain");
+  EXPECT_EQ(result->timings[0].ratio, 1.0);
+  EXPECT_EQ(result->timings[0].fetches, 1);
+  EXPECT_EQ(result->timings[2].name, "compensation");
+  EXPECT_GT(result->timings[1].ratio, 2.0);
+  for (const RenderTiming& timing : result->timings) {
+    EXPECT_GT(timing.ms_median, 0.0);
+    EXPECT_GE(timing.ms_p95, timing.ms_median);
+  }
+  EXPECT_FALSE(result->renderer.empty());
+}
+
+TEST(RenderBench, SaysWhichMaterialTheDriverRefuses) {
+  RenderBenchOptions options{.width = 64, .height = 64, .frames = 3};
+  options.materials.push_back({"broken", std::make_shared<ShaderMaterial>("return nonsense;")});
+  SilentProgress progress;
+  const auto result = bench_render(options, progress);
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, Errc::kUnavailable);
+}
+
+}  // namespace
+}  // namespace veneer::render

@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "base/random.h"
+#include "base/testing/temporary_folder.h"
+#include "btf/material.h"
+#include "render/compensate_pass.h"
+#include "render/draw_pass.h"
+#include "render/egl_context.h"
+#include "render/internal_glslang.h"
+#include "render/model_textures.h"
+
+// Every model of the registry: what its shader draws is what its evaluation in double precision
+// says.
+
+namespace veneer::render {
+namespace {
+
+using btf::Direction;
+using Eigen::Vector3d;
+using Eigen::Vector4f;
+
+constexpr int kTexels = 8;  // along a side
+
+// Body colour and gloss differ from texel to texel: Lambert, and a lobe about the mirror direction.
+void fill(std::span<Eigen::half> out, const btf::SampleSetInfo& info, int texel) {
+  Pcg32 random(static_cast<std::uint64_t>(texel), 3);
+  const Vector3d colour(random.uniform(), random.uniform(), random.uniform());
+  const double gloss = 0.3 * random.uniform();
+  const double exponent = 3 + 20 * random.uniform();
+  std::size_t i = 0;
+  for (const Direction& view : info.views) {
+    for (const Direction& light : info.lights) {
+      const Direction mirrored(-light.x(), -light.y(), light.z());
+      const double specular = gloss * std::pow(std::max(0.0, mirrored.dot(view)), exponent);
+      for (int c = 0; c < 3; ++c) out[i++] = Eigen::half(static_cast<float>(specular));
+      for (int c = 0; c < 3; ++c) out[i++] = Eigen::half(static_cast<float>(colour[c] * light.z()));
+    }
+  }
+}
+
+Result<btf::SampleSet> make_samples(const std::filesystem::path& folder) {
+  btf::SampleSetInfo info;
+  info.width = info.height = kTexels;
+  info.polarised = true;
+  info.views = info.lights = btf::bonn_directions();
+  info.source = "analytic";
+  info.licence = "Apache-2.0";
+  VENEER_ASSIGN(auto writer, btf::SampleSetWriter::create(folder, info));
+  for (int texel = 0; texel < info.texel_count(); ++texel) fill(writer.texel(texel), info, texel);
+  VENEER_TRY(writer.finish());
+  return btf::SampleSet::open(folder);
+}
+
+struct Fitted {
+  std::string name;
+  std::unique_ptr<btf::Material> material;
+};
+
+// Every model in every form of `components` that it knows.
+std::vector<Fitted> fit_all(const btf::SampleSet& set) {
+  std::vector<Fitted> all;
+  SilentProgress progress;
+  for (const btf::Model& model : btf::models()) {
+    const std::size_t before = all.size();
+    std::string refusals;
+    for (const char* components : {"1", "4", "5", "3+1", "2+2", "6+2"}) {
+      btf::FitOptions options;
+      options.clusters = 3;
+      options.components = components;
+      options.angular = 8;
+      options.basis = 0;
+      options.iterations = 5;
+      auto material = model.fit(set, options, progress);
+      if (material) {
+        all.push_back({fmt::format("{} {}", model.name, components), std::move(*material)});
+      } else {
+        EXPECT_EQ(material.error().code, Errc::kInvalidOption) << material.error().what;
+        refusals += material.error().what + "\n";
+      }
+    }
+    EXPECT_GT(all.size(), before) << model.name << " fits in no form:\n" << refusals;
+  }
+  return all;
+}
+
+const std::vector<Fitted>& fitted() {
+  static const TemporaryFolder kFolder;
+  static const auto kSet = make_samples(kFolder.path() / "analytic.btfset");
+  static const std::vector<Fitted> kAll = [] {
+    EXPECT_TRUE(kSet) << kSet.error().what;
+    return kSet ? fit_all(*kSet) : std::vector<Fitted>();
+  }();
+  return kAll;
+}
+
+struct Query {
+  int texel;
+  Direction view;
+  Direction light;
+};
+
+// Directions where interpolation has corners: the pole and beside it, grazing, the horizon and
+// below it, both sides of the azimuths where charts meet, measured directions, and any.
+Direction awkward_direction(Pcg32& random) {
+  const double phi = 2 * std::numbers::pi * random.uniform();
+  const double seam = std::numbers::pi / 4 * (random.next() % 8);
+  const double aside = 1e-6 * (random.uniform() - 0.5);
+  const auto at = [](double z, double azimuth) {
+    const double radius = std::sqrt(1 - z * z);
+    return Direction(radius * std::cos(azimuth), radius * std::sin(azimuth), z);
+  };
+  switch (random.next() % 8) {
+    case 0:
+      return at(1.0, 0.0);
+    case 1:
+      return at(1 - 1e-7, phi);
+    case 2:
+      return at(1e-4 * random.uniform(), phi);
+    case 3:
+      return at(0.0, phi);
+    case 4:
+      return at(-0.3 * random.uniform(), phi);
+    case 5:
+      return at(random.uniform(), seam + aside);
+    case 6: {
+      static const btf::DirectionSet kMeasured = btf::bonn_directions();
+      return kMeasured[random.next() % kMeasured.size()];
+    }
+    default:
+      return at(random.uniform(), phi);
+  }
+}
+
+std::vector<Query> queries(int count) {
+  Pcg32 random(5);
+  std::vector<Query> all;
+  for (int i = 0; i < count; ++i) {
+    const auto texel = static_cast<int>(random.next() % (kTexels * kTexels));
+    // What the GPU is given, so that rounding the directions themselves is no difference.
+    const auto direction = [&] {
+      return Direction(awkward_direction(random).cast<float>().cast<double>());
+    };
+    const Direction view = direction();
+    all.push_back({texel, view, direction()});
+  }
+  return all;
+}
+
+constexpr int kColumns = 64;
+constexpr int kRows = 64;
+
+std::string probe_source(const btf::ModelShader& shader) {
+  return "#version 450 core\n" + shader.source + R"(
+layout(std430, binding = 2) readonly buffer Queries { vec4 queries[]; };
+layout(location = 0) out vec4 result;
+void main() {
+  int i = 3 * (int(gl_FragCoord.y) * )" +
+         std::to_string(kColumns) + R"( + int(gl_FragCoord.x));
+  result = vec4(btf_radiance(queries[i].xy, queries[i + 1].xyz, queries[i + 2].xyz), 1.0);
+}
+)";
+}
+
+Result<std::vector<Vector4f>> draw(const btf::ModelShader& shader, const std::vector<Query>& all) {
+  VENEER_ASSIGN(const GlProgram program,
+                link_program({{GL_VERTEX_SHADER, "fullscreen.vert", fullscreen_vertex_source()},
+                              {GL_FRAGMENT_SHADER, "the model", probe_source(shader)}}));
+  VENEER_ASSIGN(const ModelTextures textures, ModelTextures::upload(shader, program.id()));
+  std::vector<Vector4f> input;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    // In any repeat of the sample, those at negative coordinates too.
+    const auto repeat = static_cast<float>(static_cast<int>(i % 5) - 2);
+    const float u = (static_cast<float>(all[i].texel % kTexels) + 0.5F) / kTexels + repeat;
+    const float v = (static_cast<float>(all[i].texel / kTexels) + 0.5F) / kTexels - repeat;
+    input.emplace_back(u, v, 0.0F, 0.0F);
+    for (const Direction& d : {all[i].view, all[i].light})
+      input.emplace_back(
+          static_cast<float>(d.x()), static_cast<float>(d.y()), static_cast<float>(d.z()), 0.0F);
+  }
+  const GlBuffer buffer = make_buffer(input.data(), input.size() * sizeof(Vector4f), 0);
+  const GlTexture target = make_texture_2d(GL_RGBA32F, kColumns, kRows);
+  const GlFramebuffer framebuffer = make_framebuffer();
+  const GlVertexArray no_vertices = make_vertex_array();
+  glNamedFramebufferTexture(framebuffer.id(), GL_COLOR_ATTACHMENT0, target.id(), 0);
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer.id());
+  glViewport(0, 0, kColumns, kRows);
+  glDisable(GL_DEPTH_TEST);
+  glUseProgram(program.id());
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 2, buffer.id());
+  textures.bind();
+  glBindVertexArray(no_vertices.id());
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  std::vector<Vector4f> output(all.size());
+  glReadPixels(0, 0, kColumns, kRows, GL_RGBA, GL_FLOAT, output.data());
+  return output;
+}
+
+// The evaluation reads the very half floats that the shader reads, so that storing them makes no
+// difference. What is left, relative to the largest sample (1.3 here):
+// - GPUs keep 8 bits of the place between two filtered texels (the GL's minimum and what hardware
+//   has), so that a filtered value is off by up to 2^-9 of the difference of neighbours in each of
+//   three dimensions;
+// - the map from a direction to texture coordinates in float is off by up to 1e-6, and by 3e-4 near
+//   the pole, where it takes a root of 1 - z: that, times 8 nodes, is 2e-3 of neighbours'
+//   difference.
+constexpr double kLargestDifference = 1.3 * 8e-3;
+// On average they cancel: a wrong formula does not.
+constexpr double kMeanDifference = 1.3 * 4e-4;
+
+TEST(ModelShaders, DrawWhatTheEvaluationSays) {
+  const auto context = EglContext::create();
+  if (!context) GTEST_SKIP() << context.error().what;
+  const std::vector<Query> all = queries(kColumns * kRows);
+  for (const Fitted& fit : fitted()) {
+    SCOPED_TRACE(fit.name);
+    const auto drawn = draw(fit.material->shader(), all);
+    ASSERT_TRUE(drawn) << drawn.error().what;
+    double sum = 0;
+    double largest = 0;
+    double brightest = 0;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const Vector3d wanted = fit.material->radiance(all[i].texel, all[i].view, all[i].light);
+      const Vector3d got = (*drawn)[i].head<3>().cast<double>();
+      const double difference = (wanted - got).cwiseAbs().maxCoeff();
+      ASSERT_LE(difference, kLargestDifference)
+          << "texel " << all[i].texel << ", view " << all[i].view.transpose() << ", light "
+          << all[i].light.transpose() << ": drawn " << got.transpose() << ", evaluated "
+          << wanted.transpose();
+      sum += difference;
+      largest = std::max(largest, difference);
+      brightest = std::max(brightest, wanted.maxCoeff());
+    }
+    RecordProperty(fit.name + " largest difference", std::to_string(largest));
+    EXPECT_LE(sum / static_cast<double>(all.size()), kMeanDifference);
+    EXPECT_GT(brightest, 0.3) << "nothing was drawn";
+  }
+}
+
+TEST(ModelShaders, AreBlackBelowTheHorizonOfTheLight) {
+  const auto context = EglContext::create();
+  if (!context) GTEST_SKIP() << context.error().what;
+  std::vector<Query> all = queries(kColumns * kRows);
+  for (Query& query : all) query.light.z() = -std::abs(query.light.z()) - 1e-3;
+  for (const Fitted& fit : fitted()) {
+    SCOPED_TRACE(fit.name);
+    const auto drawn = draw(fit.material->shader(), all);
+    ASSERT_TRUE(drawn) << drawn.error().what;
+    for (const Vector4f& pixel : *drawn) ASSERT_EQ(pixel.head<3>(), Eigen::Vector3f::Zero());
+  }
+}
+
+TEST(ModelShaders, AreValidByTheReferenceCompiler) {
+  if (!has_glslang()) GTEST_SKIP() << "glslangValidator absent: install glslang-tools";
+  for (const Fitted& fit : fitted())
+    EXPECT_EQ(glslang_complaints(draw_fragment_source(fit.material->shader().source, 2), "frag"),
+              "")
+        << fit.name;
+}
+
+TEST(ModelShaders, StateTheirFetchesAndBytes) {
+  for (const Fitted& fit : fitted()) {
+    EXPECT_GT(fit.material->shader().fetches, 0) << fit.name;
+    EXPECT_GT(fit.material->shader().gpu_bytes(), 0U) << fit.name;
+  }
+}
+
+}  // namespace
+}  // namespace veneer::render

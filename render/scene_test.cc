@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/scene.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <numbers>
+#include <string>
+
+#include "base/testing/temporary_folder.h"
+
+namespace veneer::render {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr char kLight[] = "[[light]]\ndirection = [0, 0, 2]\nilluminance_lux = 300\n";
+
+class SceneTest : public ::testing::Test {
+ protected:
+  Result<Scene> load(const std::string& text) {
+    const auto path = folder_.path() / "scene.toml";
+    std::ofstream(path) << text;
+    return Scene::load(path);
+  }
+  // The text must be refused, with all of `words` in the message.
+  void expect_refused(const std::string& text, const std::vector<std::string>& words) {
+    const auto scene = load(text);
+    ASSERT_FALSE(scene) << text;
+    EXPECT_EQ(scene.error().code, Errc::kInvalidOption) << scene.error().what;
+    for (const std::string& word : words)
+      EXPECT_NE(scene.error().what.find(word), std::string::npos)
+          << word << " in: " << scene.error().what;
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(SceneTest, ReadsEveryKey) {
+  const auto scene = load(R"(
+mesh = "plate"
+texture_repeats = [6.0, 3.0]
+[object]
+position = [1, 2, 3]
+rotation_deg = [90, 90, 0]
+tracker_body = 2
+[observer]
+tracker_body = 1
+eye_in_sensor = [0.01, 0.02, 0.03]
+[[light]]
+kind = "directional"
+direction = [0, 0, 2]
+illuminance_lux = 300
+colour = [1, 0.5, 0]
+[[light]]
+kind = "point"
+position = [0, 1, 0]
+intensity_cd = 10
+)");
+  ASSERT_TRUE(scene) << scene.error().what;
+  EXPECT_EQ(scene->texture_repeats, Eigen::Vector2d(6, 3));
+  EXPECT_EQ(scene->object_body, 2);
+  EXPECT_EQ(scene->observer_body, 1);
+  EXPECT_EQ(scene->eye_in_sensor, Vector3d(0.01, 0.02, 0.03));
+  // About x first: y becomes z. Then about y: z becomes x.
+  const Vector3d moved = scene->world_from_object * Vector3d::UnitY();
+  EXPECT_LT((moved - (Vector3d(1, 2, 3) + Vector3d::UnitX())).norm(), 1e-12) << moved.transpose();
+  ASSERT_EQ(scene->lights.size(), 2U);
+  const auto& sun = std::get<DirectionalLight>(scene->lights[0]);
+  EXPECT_EQ(sun.direction_to_light, Vector3d::UnitZ());
+  EXPECT_EQ(sun.illuminance_rgb, Vector3d(300, 150, 0));
+  const auto& lamp = std::get<PointLight>(scene->lights[1]);
+  EXPECT_EQ(lamp.position, Vector3d::UnitY());
+  EXPECT_EQ(lamp.intensity_rgb, Vector3d(10, 10, 10));
+  EXPECT_FALSE(scene->mesh.triangles.empty());
+}
+
+TEST_F(SceneTest, NeedsOnlyMeshAndOneLight) {
+  const auto scene = load(std::string("mesh = \"sphere\"\n") + kLight);
+  ASSERT_TRUE(scene) << scene.error().what;
+  EXPECT_EQ(scene->object_body, -1);
+  EXPECT_EQ(scene->observer_body, 0);
+}
+
+TEST_F(SceneTest, RefusesWhatItDoesNotKnow) {
+  const std::string plate = "mesh = \"plate\"\n";
+  expect_refused(plate + "texture_repeat = [1, 1]\n" + kLight,
+                 {"texture_repeat", "texture_repeats"});
+  expect_refused(plate, {"light"});
+  expect_refused(plate + kLight + kLight + kLight + kLight + kLight, {"light", "4"});
+  expect_refused(kLight, {"mesh"});
+  expect_refused(plate + "[[light]]\nkind = \"spot\"\n", {"kind", "directional"});
+  expect_refused(plate + "[[light]]\nkind = \"point\"\ndirection = [0, 0, 1]\nintensity_cd = 1\n",
+                 {"direction", "position"});
+  expect_refused(plate + "[[light]]\ndirection = [0, 0, 0]\nilluminance_lux = 1\n", {"direction"});
+  expect_refused(plate + "[[light]]\ndirection = [0, 0, 1]\nilluminance_lux = -1\n",
+                 {"illuminance_lux"});
+  expect_refused(plate + "[[light]]\ndirection = [0, 0, 1]\nilluminance_lux = nan\n",
+                 {"illuminance_lux"});
+  expect_refused(plate + kLight + "colour = [1, -1, 0]\n", {"colour"});
+  expect_refused(plate + "texture_repeats = [0, 1]\n" + kLight, {"texture_repeats"});
+  expect_refused(plate + "[observer]\ntracker_body = -1\n" + kLight, {"tracker_body"});
+  expect_refused(plate + "[object]\ntracker_body = -2\n" + kLight, {"tracker_body"});
+}
+
+TEST_F(SceneTest, SaysThatTheMeshIsMissing) {
+  const auto scene = load(std::string("mesh = \"teapot.obj\"\n") + kLight);
+  ASSERT_FALSE(scene);
+  EXPECT_EQ(scene.error().code, Errc::kNotFound);
+  EXPECT_NE(scene.error().what.find("teapot.obj"), std::string::npos);
+  EXPECT_EQ(Scene::load(folder_.path() / "no.toml").error().code, Errc::kNotFound);
+}
+
+}  // namespace
+}  // namespace veneer::render

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "render/compensate_pass.h"
+#include "render/draw_pass.h"
+#include "render/internal_glslang.h"
+
+namespace veneer::render {
+namespace {
+
+constexpr char kAnyModel[] =
+    "vec3 btf_radiance(vec2 uv, vec3 view, vec3 light) { return vec3(uv, view.z + light.z); }";
+
+TEST(Shaders, AreValidByTheReferenceCompiler) {
+  if (!has_glslang()) GTEST_SKIP() << "glslangValidator absent: install glslang-tools";
+  EXPECT_EQ(glslang_complaints(compensate_fragment_source(true), "frag"), "");
+  EXPECT_EQ(glslang_complaints(compensate_fragment_source(false), "frag"), "");
+  EXPECT_EQ(glslang_complaints(fullscreen_vertex_source(), "vert"), "");
+  EXPECT_EQ(glslang_complaints(count_compute_source(), "comp"), "");
+  for (const int lights : {1, kMaxLights}) {
+    EXPECT_EQ(glslang_complaints(draw_vertex_source(lights), "vert"), "");
+    EXPECT_EQ(glslang_complaints(draw_fragment_source(kAnyModel, lights), "frag"), "");
+  }
+}
+
+TEST(Shaders, AreRefusedByTheReferenceCompilerWhereTheyAreWrong) {
+  if (!has_glslang()) GTEST_SKIP() << "glslangValidator absent: install glslang-tools";
+  EXPECT_NE(glslang_complaints(draw_fragment_source("", 1), "frag"), "");
+}
+
+}  // namespace
+}  // namespace veneer::render
