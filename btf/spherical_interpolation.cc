@@ -26,6 +26,7 @@ double cross2(const Direction& a, const Direction& b) { return a.x() * b.y() - a
 SphericalInterpolator::SphericalInterpolator(const DirectionSet& directions, DirectionRole role)
     : directions_(directions), role_(role) {
   VENEER_CHECK(!directions_.empty());
+  for (const Direction& d : directions_) thetas_.push_back(angles_from_direction(d).theta);
   triangles_ = triangulate_directions(directions_);
   link_triangles();
   find_border();
@@ -161,7 +162,9 @@ SphericalInterpolator::BorderPoint SphericalInterpolator::border_at_azimuth(
                                ? border_.size() - 1
                                : static_cast<std::size_t>(above - border_azimuth_.begin()) - 1;
   const auto [from, to] = border_[edge];
-  const Direction along(std::cos(phi), std::sin(phi), 0.0);
+  // Only its direction counts; straight down, every azimuth is as good as 0.
+  const bool straight_down = direction.head<2>().isZero(0.0);
+  const Direction along = straight_down ? Direction::UnitX() : direction;
   const double w0 = std::max(cross2(along, directions_[static_cast<std::size_t>(to)]), 0.0);
   const double w1 = std::max(cross2(directions_[static_cast<std::size_t>(from)], along), 0.0);
   return {border_[edge], {w0 / (w0 + w1), w1 / (w0 + w1)}};
@@ -211,11 +214,11 @@ DirectionWeights SphericalInterpolator::outside(const Direction& direction) cons
     result.scale = 0.0;
     return result;
   }
-  const Direction& a = directions_[static_cast<std::size_t>(border.index[0])];
-  const Direction& b = directions_[static_cast<std::size_t>(border.index[1])];
-  const double theta = border.weight[0] * angles_from_direction(a).theta +
-                       border.weight[1] * angles_from_direction(b).theta;
-  const double cos_point = (border.weight[0] * a + border.weight[1] * b).normalized().z();
+  const auto from = static_cast<std::size_t>(border.index[0]);
+  const auto to = static_cast<std::size_t>(border.index[1]);
+  const double theta = border.weight[0] * thetas_[from] + border.weight[1] * thetas_[to];
+  const double cos_point =
+      (border.weight[0] * directions_[from] + border.weight[1] * directions_[to]).normalized().z();
   const double cos_border = std::min(std::cos(theta), cos_point);
   // No division by the cosine of a border on the horizon: there every light is above the border.
   if (direction.z() < cos_border) result.scale = direction.z() / cos_border;

@@ -74,6 +74,7 @@ class SphericalInterpolator {
   [[nodiscard]] DirectionWeights outside(const Direction& direction) const;
 
   DirectionSet directions_;
+  std::vector<double> thetas_;  // of each direction
   DirectionRole role_;
   std::vector<std::array<int, 3>> triangles_;
   std::vector<Cell> cells_;  // one for each triangle
