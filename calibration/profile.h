@@ -28,8 +28,8 @@ struct ProjectorGeometry {
 /// With drive d in [0,1]^3, tone curves t, primaries M, black k, geometry G and surface A, the
 /// luminance of a point x is, in XYZ and cd/m^2,
 ///   L(x) = A [ G(x) (M t(d) + k) + E ],   G(x) = cos(theta_p) (r_ref / r)^2 vignetting(pixel).
-/// M, k and E are those of a perfect diffuser: M and k one that faces the projector at distance
-/// r_ref on its axis, E wherever the object stands.
+/// M, k and E are those of a perfect diffuser: M and k one that faces the lens at distance
+/// r_ref in the direction of the raster's centre, E wherever the object stands.
 struct ProjectorProfile {
   ProjectorGeometry geometry;
   int bits = 8;  ///< of a drive code
@@ -39,7 +39,8 @@ struct ProjectorProfile {
   Eigen::Matrix3d primaries = Eigen::Matrix3d::Identity();  ///< M: columns are XYZ of R, G, B
   Xyz black = Xyz::Zero();                                  ///< k
   double reference_distance_m = 1.0;                        ///< r_ref
-  /// Relative output over the raster, 1 at the reference; any size, stretched over it, bilinear.
+  /// Radiant intensity over the raster, 1 at its centre; any size, stretched over it, bilinear between
+  /// texel centres as GL does, clamped beyond them.
   Image<float> vignetting;
   Eigen::Matrix3d surface = Eigen::Matrix3d::Identity();  ///< A, in XYZ
   Xyz ambient = Xyz::Zero();                              ///< E

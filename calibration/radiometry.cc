@@ -232,6 +232,7 @@ class Measurement {
     for (const Xyz& r : response) weighted += r * r.dot(start);
     const Xyz direction = weighted.normalized();
     std::vector<double> output;
+    output.reserve(response.size());
     for (const Xyz& r : response) output.push_back(r.dot(direction));
     const double full = output.back();
     result_.profile.primaries.col(channel) = full * direction;
@@ -306,6 +307,7 @@ class Measurement {
     const ProjectorGeometry& g = result_.profile.geometry;
     const auto spots = [](int count, int extent) {
       std::vector<double> at;
+      at.reserve(static_cast<std::size_t>(count));
       for (int i = 0; i < count; ++i)
         at.push_back(std::lerp(kMargin, 1.0 - kMargin, i / (count - 1.0)) * extent);
       return at;

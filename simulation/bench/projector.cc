@@ -32,6 +32,7 @@ std::vector<float> half_kernel(double sigma) {
     sum += (i == 0 ? 1.0 : 2.0) * weights.back();
   }
   std::vector<float> kernel;
+  kernel.reserve(weights.size());
   for (const double weight : weights) kernel.push_back(static_cast<float>(weight / sum));
   return kernel;
 }
