@@ -39,8 +39,8 @@ struct ProjectorProfile {
   Eigen::Matrix3d primaries = Eigen::Matrix3d::Identity();  ///< M: columns are XYZ of R, G, B
   Xyz black = Xyz::Zero();                                  ///< k
   double reference_distance_m = 1.0;                        ///< r_ref
-  /// Radiant intensity over the raster, 1 at its centre; any size, stretched over it, bilinear between
-  /// texel centres as GL does, clamped beyond them.
+  /// Radiant intensity over the raster, 1 at its centre; any size, stretched over it, bilinear
+  /// between texel centres as GL does, clamped beyond them.
   Image<float> vignetting;
   Eigen::Matrix3d surface = Eigen::Matrix3d::Identity();  ///< A, in XYZ
   Xyz ambient = Xyz::Zero();                              ///< E
