@@ -25,10 +25,14 @@ constexpr int kPowerIterations = 2;
 constexpr int kOversampling = 6;
 // Lloyd's algorithm ends when an iteration gains less than this part of the error.
 constexpr double kLeastGain = 1e-4;
+constexpr double kFloatResolution = 1e-7;
+constexpr int kStarts = 6;
 constexpr double kLeastKMeansGain = 1e-3;
 constexpr int kMostKMeansIterations = 25;
-// Eigenvalues under this part of the largest are rounding in float, not data.
-constexpr double kRankTolerance = 1e-10;
+// Eigenvalues under this part of the largest are rounding, not data: of a Gram matrix in float, and
+// of one in double made from float values.
+constexpr float kFloatRankTolerance = 1e-6F;
+constexpr double kRankTolerance = 1e-12;
 
 // The columns [first, first + count) of each part in some matrix.
 struct Range {
@@ -233,8 +237,7 @@ RowMatrix leading_directions(const RowMatrix& points, int count) {
   const float largest = solver.eigenvalues()[size - 1];
   for (Eigen::Index i = 0; i < std::min<Eigen::Index>(count, size); ++i) {
     const auto vector = solver.eigenvectors().col(size - 1 - i);
-    // In float a Gram matrix resolves eigenvalues down to about 1e-6 of the largest.
-    if (!(solver.eigenvalues()[size - 1 - i] > 1e-6F * largest)) break;
+    if (!(solver.eigenvalues()[size - 1 - i] > kFloatRankTolerance * largest)) break;
     if (wide)
       directions.row(i) = (vector.transpose() * points).normalized();
     else
@@ -254,31 +257,48 @@ class Lloyd {
     norms_ = projection.coordinates.rowwise().squaredNorm();
   }
 
+  /// The best of several starts: they end up to a tenth apart in squared error, and cost little.
   std::vector<int> run(Progress& progress, int& iterations) {
+    progress.start("clusters", kStarts);
     Pcg32 random(options_.seed, 2);
-    progress.start("clusters", options_.iterations);
-    std::vector<int> cluster = k_means(projection_.coordinates, clusters_, random);
-    std::vector<int> best = cluster;
+    std::vector<int> best;
     double least = std::numeric_limits<double>::infinity();
-    const double energy = norms_.cast<double>().sum();
-    for (iterations = 0; iterations < options_.iterations;) {
-      find_directions(cluster);
-      const double error = assign(cluster);
-      ++iterations;
-      progress.advance();
-      const bool gained = least - error > kLeastGain * error;
+    for (int start = 0; start < kStarts; ++start) {
+      std::vector<int> cluster = k_means(projection_.coordinates, clusters_, random);
+      int done = 0;
+      const double error = improve(cluster, done);
       if (error < least) {
         least = error;
-        best = cluster;
+        best = std::move(cluster);
+        iterations = done;
       }
-      // Below float's resolution of the energies nothing is left to gain.
-      if (!gained || error <= 1e-7 * energy) break;
+      progress.advance();
     }
     progress.finish(fmt::format("{} iterations", iterations));
     return best;
   }
 
  private:
+  // Alternates until nothing is gained; leaves the best clusters seen, returns their squared error.
+  double improve(std::vector<int>& best, int& iterations) {
+    std::vector<int> cluster = best;
+    double least = std::numeric_limits<double>::infinity();
+    const double energy = norms_.cast<double>().sum();
+    while (iterations < options_.iterations) {
+      find_directions(cluster);
+      const double error = assign(cluster);
+      ++iterations;
+      const bool gained = least - error > kLeastGain * error;
+      if (error < least) {
+        least = error;
+        best = cluster;
+      }
+      // Below float's resolution of the energies nothing is left to gain.
+      if (!gained || error <= kFloatResolution * energy) break;
+    }
+    return least;
+  }
+
   void find_directions(const std::vector<int>& cluster) {
     const auto members = members_of(cluster, clusters_);
     parallel_for(clusters_, 1, [&](std::int64_t begin, std::int64_t end) {

@@ -62,6 +62,19 @@ LpcaFactors factors_of(const LocalPca& pca) {
   return factors;
 }
 
+LpcaFactors fit_factors(const RowSource& source,
+                        const std::vector<int>& components,
+                        const FitOptions& options,
+                        Progress& progress) {
+  return factors_of(fit_local_pca(source,
+                                  {.clusters = options.clusters,
+                                   .components = components,
+                                   .basis = options.basis,
+                                   .iterations = options.iterations,
+                                   .seed = options.seed},
+                                  progress));
+}
+
 void add_factors(const LpcaFactors& factors, int texels, Material::Contents& contents) {
   contents.tensors.push_back(tensor_of("clusters", {texels}, factors.cluster));
   contents.tensors.push_back(tensor_of("weights", {texels, factors.components}, factors.weights));

@@ -25,6 +25,12 @@ struct LpcaFactors {
 /// @param pca  all parts with the same number of columns.
 [[nodiscard]] LpcaFactors factors_of(const LocalPca& pca);
 
+/// Fits rows of one part for each of `components` and brings them to the stored form.
+[[nodiscard]] LpcaFactors fit_factors(const RowSource& source,
+                                      const std::vector<int>& components,
+                                      const FitOptions& options,
+                                      Progress& progress);
+
 /// Adds the tensors "clusters", "weights", "eigen_brdfs" to a material's contents.
 void add_factors(const LpcaFactors& factors, int texels, Material::Contents& contents);
 /// Reads them back. Errors: kBadFormat (shapes that do not fit, values that are not finite, a

@@ -54,4 +54,6 @@ void add_transposed_product(const RowBlock& a, const RowBlock& b, MutableRowBloc
   gemm(CblasTrans, CblasNoTrans, a.rows(), a, b, 1.0F, out);
 }
 
+std::string blas_description() { return openblas_get_config(); }
+
 }  // namespace veneer::btf

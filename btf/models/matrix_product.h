@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 
+#include <string>
+
 namespace veneer::btf {
 
 /// Float matrices as data come: one row per texel, contiguous.
@@ -19,5 +21,8 @@ void product(const RowBlock& a, const RowBlock& b, MutableRowBlock out);
 void product_transposed(const RowBlock& a, const RowBlock& b, MutableRowBlock out);
 /// out += a^T * b.
 void add_transposed_product(const RowBlock& a, const RowBlock& b, MutableRowBlock out);
+
+/// Which BLAS is in use, for people: a slow one is found by its name.
+[[nodiscard]] std::string blas_description();
 
 }  // namespace veneer::btf

@@ -67,14 +67,8 @@ Result<PackedLpca> PackedLpca::fit(const MaterialFrame& frame,
     const auto count = static_cast<std::size_t>(pairs);
     read(texel, values.first(count), values.last(count));
   };
-  const LocalPca pca = fit_local_pca(source,
-                                     {.clusters = options.clusters,
-                                      .components = {layout.components[0], layout.components[1]},
-                                      .basis = options.basis,
-                                      .iterations = options.iterations,
-                                      .seed = options.seed},
-                                     progress);
-  return PackedLpca(frame, layout, factors_of(pca));
+  const auto [first, second] = layout.components;
+  return PackedLpca(frame, layout, fit_factors(source, {first, second}, options, progress));
 }
 
 PackedLpca::PackedLpca(MaterialFrame frame, Layout layout, LpcaFactors factors)

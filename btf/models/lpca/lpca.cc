@@ -157,14 +157,8 @@ Result<std::unique_ptr<Material>> fit_lpca(const SampleSet& set,
   source.rows = frame.texel_count();
   source.part_columns = {frame.pair_count() * 3};
   source.read = [&set](int texel, std::span<float> rgb) { set.rgb(texel, Part::kTotal, rgb); };
-  const LocalPca pca = fit_local_pca(source,
-                                     {.clusters = options.clusters,
-                                      .components = {components},
-                                      .basis = options.basis,
-                                      .iterations = options.iterations,
-                                      .seed = options.seed},
-                                     progress);
-  return std::make_unique<Lpca>(std::move(frame), factors_of(pca));
+  LpcaFactors factors = fit_factors(source, {components}, options, progress);
+  return std::make_unique<Lpca>(std::move(frame), std::move(factors));
 }
 
 Result<std::unique_ptr<Material>> load_lpca(const SafetensorsFile& file) {
