@@ -24,12 +24,10 @@ using Eigen::Vector3d;
 
 constexpr int kPlainTexels = 256;  // along a side of the plain texture
 constexpr int kWarmUpFrames = 2;
+const DirectionalLight kLight{Vector3d(0.3, -0.4, -0.9).normalized(),
+                              Vector3d::Constant(100.0 * std::numbers::pi)};
 constexpr std::string_view kQueryClock = "GL timer query";
 constexpr std::string_view kFinishClock = "steady clock around glFinish";
-
-constexpr char kPlainGlsl[] =
-#include "render/shaders/plain.glsl.inc"
-    ;
 
 // A projector at the origin and, half a metre off, a surface that fills its raster and a little
 // more. The machine itself is the simplest there is; what it shows is of no interest here.
@@ -84,7 +82,7 @@ Mesh frame_filling_mesh(const calibration::ProjectorGeometry& g) {
   return mesh;
 }
 
-btf::ModelShader plain_shader() {
+btf::ModelShader plain_textures() {
   btf::ModelTexture texture;
   texture.sampler = "Albedo";
   texture.format = btf::TexelFormat::kRgba16f;
@@ -97,7 +95,6 @@ btf::ModelShader plain_shader() {
     texture.data.insert(texture.data.end(), bytes, bytes + sizeof(value));
   }
   btf::ModelShader shader;
-  shader.source = kPlainGlsl;
   shader.textures.push_back(std::move(texture));
   shader.fetches = 1;
   return shader;
@@ -125,9 +122,16 @@ class Bench {
     VENEER_ASSIGN(CompensatePass compensate,
                   CompensatePass::create(compensation, vignetting.view()));
     Bench bench(std::move(context), profile, std::move(compensate));
-    VENEER_TRY(bench.add("plain", plain_shader(), kPlainTexels, kPlainTexels));
-    for (const auto& [name, material] : options.materials)
-      VENEER_TRY(bench.add(name, material->shader(), material->width(), material->height()));
+    const btf::ModelShader plain = plain_textures();
+    VENEER_TRY(bench.add(
+        "plain",
+        plain,
+        DrawPass::create_plain(plain, kLight, bench.repeats(kPlainTexels, kPlainTexels), profile)));
+    for (const auto& [name, material] : options.materials) {
+      const btf::ModelShader shader = material->shader();
+      const Eigen::Vector2d repeats = bench.repeats(material->width(), material->height());
+      VENEER_TRY(bench.add(name, shader, DrawPass::create(shader, {kLight}, repeats, profile)));
+    }
     bench.entrants_.emplace_back().timing.name = "compensation";
     return bench;
   }
@@ -157,14 +161,13 @@ class Bench {
     glNamedFramebufferTexture(framebuffer_.id(), GL_DEPTH_ATTACHMENT, depth_.id(), 0);
   }
 
-  // Texels as large as pixels: as many repeats as the material has to be laid side by side for
-  // that.
-  Status add(const std::string& name, const btf::ModelShader& shader, int width, int height) {
-    const Light light = DirectionalLight{Vector3d(0.3, -0.4, -0.9).normalized(),
-                                         Vector3d::Constant(100.0 * std::numbers::pi)};
-    const Eigen::Vector2d repeats(static_cast<double>(profile_.geometry.width) / width,
-                                  static_cast<double>(profile_.geometry.height) / height);
-    auto pass = DrawPass::create(shader, {light}, repeats, profile_);
+  // Texels as large as pixels: as many repeats as it takes to lay the material side by side.
+  [[nodiscard]] Eigen::Vector2d repeats(int width, int height) const {
+    return {static_cast<double>(profile_.geometry.width) / width,
+            static_cast<double>(profile_.geometry.height) / height};
+  }
+
+  Status add(const std::string& name, const btf::ModelShader& shader, Result<DrawPass> pass) {
     if (!pass) return fail_while(fmt::format("timing {}", name), pass.error());
     Entrant& entrant = entrants_.emplace_back();
     entrant.timing.name = name;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/compensate_pass.h"
 
-#include <bit>
+#include <array>
 #include <vector>
 
 namespace veneer::render {
@@ -20,6 +20,7 @@ constexpr std::string_view kVersion = "#version 450 core\n";
 // Pixels that one work group of count.comp takes: 8 x 8 invocations with tiles of 16 x 8.
 constexpr int kGroupWidth = 128;
 constexpr int kGroupHeight = 64;
+constexpr int kLevelsWidth = 1024;        // of the texture of levels
 constexpr std::size_t kCounterCount = 5;  // of the block Counters
 constexpr double kLossUnit = 1.0 / 64.0;  // of the loss in the codes' alpha
 
@@ -37,7 +38,7 @@ struct ConstantsBlock {
   float geometry_floor;
   float gamut_tolerance;
   float dither;
-  float padding;
+  std::int32_t gamut_steps;
 };
 static_assert(sizeof(ConstantsBlock) == 4 * 64 + 6 * 16);
 
@@ -71,23 +72,40 @@ ConstantsBlock block_of(const Compensation& compensation) {
   block.geometry_floor = static_cast<float>(c.geometry_floor);
   block.gamut_tolerance = static_cast<float>(kGamutTolerance);
   block.dither = c.dither ? 1.0F : 0.0F;
+  block.gamut_steps = kGamutSteps;
   return block;
 }
 
-// The block Tones: all seeds, then all levels, channel by channel.
-GlBuffer upload_tones(const Compensation& compensation) {
-  std::vector<std::uint32_t> words;
-  for (const ToneLevels& tone : compensation.tone_levels()) {
-    for (const auto& seed : tone.seeds())
-      words.push_back(seed[0] | static_cast<std::uint32_t>(seed[1]) << 16U);
+// One row for each channel; the texel says where its piece's level is.
+GlTexture upload_seeds(const Compensation& compensation) {
+  GlTexture texture = make_texture_2d(GL_RG16UI, ToneLevels::kSeeds, 3);
+  for (int i = 0; i < 3; ++i) {
+    const auto seeds = compensation.tone_levels()[static_cast<std::size_t>(i)].seeds();
+    glTextureSubImage2D(texture.id(),
+                        0,
+                        0,
+                        i,
+                        ToneLevels::kSeeds,
+                        1,
+                        GL_RG_INTEGER,
+                        GL_UNSIGNED_SHORT,
+                        seeds.data());
   }
+  return texture;
+}
+
+// The levels of all channels one after the other, in rows of kLevelsWidth.
+GlTexture upload_levels(const Compensation& compensation) {
+  std::vector<std::array<float, 2>> texels;
   for (const ToneLevels& tone : compensation.tone_levels()) {
-    for (std::size_t i = 0; i < tone.levels().size(); ++i) {
-      words.push_back(std::bit_cast<std::uint32_t>(tone.levels()[i]));
-      words.push_back(std::bit_cast<std::uint32_t>(static_cast<float>(tone.codes()[i])));
-    }
+    for (std::size_t i = 0; i < tone.levels().size(); ++i)
+      texels.push_back({tone.levels()[i], static_cast<float>(tone.codes()[i])});
   }
-  return make_buffer(words.data(), words.size() * sizeof(std::uint32_t), 0);
+  const auto rows = static_cast<int>((texels.size() + kLevelsWidth - 1) / kLevelsWidth);
+  texels.resize(static_cast<std::size_t>(rows) * kLevelsWidth);
+  GlTexture texture = make_texture_2d(GL_RG32F, kLevelsWidth, rows);
+  glTextureSubImage2D(texture.id(), 0, 0, 0, kLevelsWidth, rows, GL_RG, GL_FLOAT, texels.data());
+  return texture;
 }
 
 GLsizei groups(int pixels, int per_group) { return (pixels + per_group - 1) / per_group; }
@@ -95,10 +113,10 @@ GLsizei groups(int pixels, int per_group) { return (pixels + per_group - 1) / pe
 }  // namespace
 
 std::string compensate_fragment_source(bool compensate) {
-  return fmt::format("{}#define SEED_COUNT {}\n#define GAMUT_STEPS {}\n{}{}",
+  return fmt::format("{}#define SEED_COUNT {}\n#define LEVELS_WIDTH {}\n{}{}",
                      kVersion,
                      ToneLevels::kSeeds,
-                     kGamutSteps,
+                     kLevelsWidth,
                      compensate ? "#define COMPENSATE\n" : "",
                      kCompensateFrag);
 }
@@ -121,7 +139,8 @@ Result<CompensatePass> CompensatePass::create(const Compensation& compensation,
 
   const ConstantsBlock block = block_of(compensation);
   pass.constants_ = make_buffer(&block, sizeof(block), 0);
-  pass.tones_ = upload_tones(compensation);
+  pass.seeds_ = upload_seeds(compensation);
+  pass.levels_ = upload_levels(compensation);
   pass.vignetting_ = make_texture_2d(GL_R32F, pass.width_, pass.height_);
   glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
   glPixelStorei(GL_UNPACK_ROW_LENGTH, static_cast<GLint>(vignetting.stride()));
@@ -173,9 +192,10 @@ void CompensatePass::run(GLuint target, std::uint32_t dither_seed) {
   glUseProgram(program_.id());
   glProgramUniform1ui(program_.id(), seed_location_, dither_seed);
   glBindBufferBase(GL_UNIFORM_BUFFER, 1, constants_.id());
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, tones_.id());
   glBindTextureUnit(0, target);
   glBindTextureUnit(1, vignetting_.id());
+  glBindTextureUnit(2, seeds_.id());
+  glBindTextureUnit(3, levels_.id());
   glBindVertexArray(no_vertices_.id());
   glDrawArrays(GL_TRIANGLES, 0, 3);
 

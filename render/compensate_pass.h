@@ -58,7 +58,8 @@ class CompensatePass {
   GlProgram program_;
   GlProgram count_program_;
   GlBuffer constants_;
-  GlBuffer tones_;
+  GlTexture seeds_;
+  GlTexture levels_;
   GlBuffer counters_;  // kRing slots, mapped for good
   GlTexture vignetting_;
   GlTexture codes_;

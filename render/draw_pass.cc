@@ -20,6 +20,10 @@ constexpr char kDrawFrag[] =
 #include "render/shaders/draw.frag.inc"
     ;
 
+constexpr char kPlainFrag[] =
+#include "render/shaders/plain.frag.inc"
+    ;
+
 // The block Frame of frame.glsl, with room for every light; a program reads as much as it declares.
 struct FrameBlock {
   Eigen::Matrix4f clip_from_object;
@@ -73,29 +77,49 @@ std::string draw_fragment_source(const std::string& model_source, int light_coun
   return header(light_count) + model_source + "\n" + kDrawFrag;
 }
 
+std::string plain_fragment_source() { return header(1) + kPlainFrag; }
+
+DrawPass::DrawPass(std::vector<Light> lights,
+                   const Eigen::Vector2d& texture_repeats,
+                   const calibration::ProjectorProfile& profile)
+    : uniforms_(make_buffer(nullptr, sizeof(FrameBlock), GL_DYNAMIC_STORAGE_BIT)),
+      lights_(std::move(lights)),
+      texture_repeats_(texture_repeats),
+      clip_from_world_(clip_from_projector(profile.geometry) *
+                       profile.geometry.world_from_projector.inverse().matrix()),
+      projector_in_world_(profile.geometry.world_from_projector.translation),
+      reference_distance_m_(profile.reference_distance_m),
+      width_(profile.geometry.width),
+      height_(profile.geometry.height) {
+  VENEER_CHECK(!lights_.empty() && lights_.size() <= kMaxLights);
+}
+
+Status DrawPass::link(const std::string& fragment_source, const btf::ModelShader& textures) {
+  VENEER_ASSIGN(
+      program_,
+      link_program(
+          {{GL_VERTEX_SHADER, "draw.vert", draw_vertex_source(static_cast<int>(lights_.size()))},
+           {GL_FRAGMENT_SHADER, "draw.frag or plain.frag", fragment_source}}));
+  VENEER_ASSIGN(textures_, ModelTextures::upload(textures, program_.id()));
+  return {};
+}
+
 Result<DrawPass> DrawPass::create(const btf::ModelShader& shader,
                                   std::vector<Light> lights,
                                   const Eigen::Vector2d& texture_repeats,
                                   const calibration::ProjectorProfile& profile) {
-  VENEER_CHECK(!lights.empty() && lights.size() <= kMaxLights);
   const auto light_count = static_cast<int>(lights.size());
-  DrawPass pass;
-  VENEER_ASSIGN(pass.program_,
-                link_program({{GL_VERTEX_SHADER, "draw.vert", draw_vertex_source(light_count)},
-                              {GL_FRAGMENT_SHADER,
-                               "draw.frag with the material's model",
-                               draw_fragment_source(shader.source, light_count)}}));
-  VENEER_ASSIGN(pass.textures_, ModelTextures::upload(shader, pass.program_.id()));
-  pass.uniforms_ = make_buffer(nullptr, sizeof(FrameBlock), GL_DYNAMIC_STORAGE_BIT);
-  pass.lights_ = std::move(lights);
-  pass.texture_repeats_ = texture_repeats;
-  const calibration::ProjectorGeometry& geometry = profile.geometry;
-  pass.clip_from_world_ =
-      clip_from_projector(geometry) * geometry.world_from_projector.inverse().matrix();
-  pass.projector_in_world_ = geometry.world_from_projector.translation;
-  pass.reference_distance_m_ = profile.reference_distance_m;
-  pass.width_ = geometry.width;
-  pass.height_ = geometry.height;
+  DrawPass pass(std::move(lights), texture_repeats, profile);
+  VENEER_TRY(pass.link(draw_fragment_source(shader.source, light_count), shader));
+  return pass;
+}
+
+Result<DrawPass> DrawPass::create_plain(const btf::ModelShader& textures,
+                                        const DirectionalLight& light,
+                                        const Eigen::Vector2d& texture_repeats,
+                                        const calibration::ProjectorProfile& profile) {
+  DrawPass pass({light}, texture_repeats, profile);
+  VENEER_TRY(pass.link(plain_fragment_source(), textures));
   return pass;
 }
 

@@ -28,6 +28,8 @@ inline constexpr double kNearPlane = 0.01;  // metres
 /// The sources of the draw program for a model and a number of lights, complete and compilable.
 [[nodiscard]] std::string draw_vertex_source(int light_count);
 [[nodiscard]] std::string draw_fragment_source(const std::string& model_source, int light_count);
+/// The same for the benchmark's yardstick, plain.frag, which reads the texture "Albedo".
+[[nodiscard]] std::string plain_fragment_source();
 
 /// Where a frame is seen from and drawn on.
 struct DrawInput {
@@ -44,11 +46,19 @@ class DrawPass {
                                                std::vector<Light> lights,
                                                const Eigen::Vector2d& texture_repeats,
                                                const calibration::ProjectorProfile& profile);
+  /// The yardstick of the benchmark, for one directional light; `textures` holds "Albedo".
+  [[nodiscard]] static Result<DrawPass> create_plain(const btf::ModelShader& textures,
+                                                     const DirectionalLight& light,
+                                                     const Eigen::Vector2d& texture_repeats,
+                                                     const calibration::ProjectorProfile& profile);
   /// Clears the bound framebuffer and draws. Sets all GL state that it needs.
   void draw(const MeshBuffers& mesh, const DrawInput& input) const;
 
  private:
-  DrawPass() = default;
+  DrawPass(std::vector<Light> lights,
+           const Eigen::Vector2d& texture_repeats,
+           const calibration::ProjectorProfile& profile);
+  [[nodiscard]] Status link(const std::string& fragment_source, const btf::ModelShader& textures);
   GlProgram program_;
   ModelTextures textures_;
   GlBuffer uniforms_;
@@ -56,9 +66,9 @@ class DrawPass {
   Eigen::Vector2d texture_repeats_;
   Eigen::Matrix4d clip_from_world_;
   Eigen::Vector3d projector_in_world_;
-  double reference_distance_m_ = 1.0;
-  int width_ = 0;
-  int height_ = 0;
+  double reference_distance_m_;
+  int width_;
+  int height_;
 };
 
 }  // namespace veneer::render

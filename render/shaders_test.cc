@@ -17,6 +17,7 @@ TEST(Shaders, AreValidByTheReferenceCompiler) {
   EXPECT_EQ(glslang_complaints(compensate_fragment_source(false), "frag"), "");
   EXPECT_EQ(glslang_complaints(fullscreen_vertex_source(), "vert"), "");
   EXPECT_EQ(glslang_complaints(count_compute_source(), "comp"), "");
+  EXPECT_EQ(glslang_complaints(plain_fragment_source(), "frag"), "");
   for (const int lights : {1, kMaxLights}) {
     EXPECT_EQ(glslang_complaints(draw_vertex_source(lights), "vert"), "");
     EXPECT_EQ(glslang_complaints(draw_fragment_source(kAnyModel, lights), "frag"), "");

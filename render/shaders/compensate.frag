@@ -8,20 +8,18 @@ layout(std140, binding = 1) uniform Compensation {
   vec4 drive_of_ambient;
   vec4 drive_of_black;
   vec4 drive_of_white;
-  ivec4 first_level;  // of each channel in Tones.levels
+  ivec4 first_level;  // of each channel in levels_texture
   ivec4 level_count;
   float geometry_floor;
   float gamut_tolerance;
   float dither;  // 1: on
+  int gamut_steps;
 } constants;
-
-layout(std430, binding = 0) readonly buffer Tones {
-  uint seeds[3 * SEED_COUNT];  // lowest level | highest level << 16
-  vec2 levels[];               // output, code
-} tones;
 
 layout(binding = 0) uniform sampler2D target_texture;
 layout(binding = 1) uniform sampler2D vignetting_texture;
+layout(binding = 2) uniform usampler2D seeds_texture;  // row: channel; lowest and highest level
+layout(binding = 3) uniform sampler2D levels_texture;  // output and code, LEVELS_WIDTH to a row
 uniform uint dither_seed;
 
 layout(location = 0) out uvec4 codes;  // a: PixelState << 14 | gamut loss in units of 1/64
@@ -46,7 +44,7 @@ bool is_inside(vec3 drive, float tolerance) {
 }
 
 // The drive nearest to the target in its own hue, and the loss in IPT x 100.
-vec4 map_to_gamut(vec3 target, vec3 drive, float g) {
+vec4 map_to_gamut(vec3 target, vec3 drive, float g, int steps) {
   vec3 offset = constants.drive_of_ambient.xyz / g + constants.drive_of_black.xyz;
   vec3 wanted = kIptFromPowers * signed_power(mat3(constants.cones_from_target) * target, kIptExponent);
 
@@ -74,7 +72,9 @@ vec4 map_to_gamut(vec3 target, vec3 drive, float g) {
   float kept = 0.0;
   float part = 0.5;
   vec3 mapped = drive_from_cones * signed_power(powers_at_anchor, 1.0 / kIptExponent) - offset;
-  for (int i = 0; i < GAMUT_STEPS; ++i) {
+  // A count that is no constant keeps compilers from unrolling: software rasterisers do not skip a
+  // branch that no pixel takes, but they leave a loop.
+  for (int i = 0; i < steps; ++i) {
     vec3 powers = powers_at_anchor + (kept + part) * powers_along_way;
     vec3 tried = drive_from_cones * signed_power(powers, 1.0 / kIptExponent) - offset;
     if (is_inside(tried, 0.0)) {
@@ -86,31 +86,45 @@ vec4 map_to_gamut(vec3 target, vec3 drive, float g) {
   return vec4(clamp(mapped, 0.0, 1.0), 100.0 * (1.0 - kept) * length(way));
 }
 
-float dither_threshold(uvec2 pixel, uint channel) {
-  uint u = pixel.x * 0xC13FA9A9u + pixel.y * 0x91E10DA5u + dither_seed * 0x9E3779B9u +
-           channel * 0x55555555u;
-  return constants.dither != 0.0 ? (float(u >> 8) + 0.5) / 16777216.0 : 0.5;
+vec3 dither_thresholds(uvec2 pixel) {
+  uint u = pixel.x * 0xC13FA9A9u + pixel.y * 0x91E10DA5u + dither_seed * 0x9E3779B9u;
+  uvec3 channels = u + uvec3(0u, 0x55555555u, 0xAAAAAAAAu);
+  return constants.dither != 0.0 ? (vec3(channels >> 8) + 0.5) / 16777216.0 : vec3(0.5);
 }
 
-// One of the two codes that bracket t in linear light.
-uint code_of(int channel, float t, float threshold) {
-  uint seed = tones.seeds[channel * SEED_COUNT + min(int(sqrt(t) * SEED_COUNT), SEED_COUNT - 1)];
-  int first = constants.first_level[channel];
-  int low = first + int(seed & 0xffffu);
-  int high = first + int(seed >> 16);
-  while (low < high) {
-    int middle = (low + high + 1) >> 1;
-    if (tones.levels[middle].x <= t) {
-      low = middle;
-    } else {
-      high = middle - 1;
-    }
+vec2 level(int index) {
+  return texelFetch(levels_texture, ivec2(index % LEVELS_WIDTH, index / LEVELS_WIDTH), 0).rg;
+}
+
+// For each channel one of the two codes that bracket the drive in linear light.
+uvec3 codes_of(vec3 drive, vec3 threshold) {
+  ivec3 piece = min(ivec3(sqrt(drive) * SEED_COUNT), SEED_COUNT - 1);
+  ivec3 low;
+  ivec3 high;
+  for (int i = 0; i < 3; ++i) {
+    ivec2 range = ivec2(texelFetch(seeds_texture, ivec2(piece[i], i), 0).rg);
+    low[i] = range.x;
+    high[i] = range.y;
   }
-  vec2 lower = tones.levels[low];
-  vec2 upper = tones.levels[min(low + 1, first + constants.level_count[channel] - 1)];
-  // The highest level has none above it; levels rise strictly, so that nothing else divides by 0.
-  bool up = (t - lower.x) > threshold * (upper.x - lower.x) && upper.x > lower.x;
-  return uint(up ? upper.y : lower.y);
+  ivec3 first = constants.first_level.xyz;
+  ivec3 last = constants.level_count.xyz - 1;
+  while (any(lessThan(low, high))) {
+    ivec3 middle = (low + high + 1) >> 1;
+    vec3 outputs = vec3(level(first.x + middle.x).x, level(first.y + middle.y).x,
+                        level(first.z + middle.z).x);
+    bvec3 above = greaterThan(outputs, drive);
+    low = mix(middle, low, above);
+    high = mix(high, max(middle - 1, low), above);
+  }
+  uvec3 chosen;
+  for (int i = 0; i < 3; ++i) {
+    vec2 lower = level(first[i] + low[i]);
+    vec2 upper = level(first[i] + min(low[i] + 1, last[i]));
+    // The highest level has none above it: there both are the same, and the lower one is taken.
+    bool up = drive[i] - lower.x > threshold[i] * (upper.x - lower.x) && upper.x > lower.x;
+    chosen[i] = uint(up ? upper.y : lower.y);
+  }
+  return chosen;
 }
 
 void main() {
@@ -136,15 +150,12 @@ void main() {
   if (!is_inside(drive, constants.gamut_tolerance)) {
     state = kOutOfGamut;
 #ifdef COMPENSATE
-    vec4 mapped = map_to_gamut(texel.rgb, drive, g);
+    vec4 mapped = map_to_gamut(texel.rgb, drive, g, constants.gamut_steps);
     drive = mapped.xyz;
     loss = mapped.w;
 #endif
   }
   drive = clamp(drive, 0.0, 1.0);
-  uvec2 position = uvec2(pixel);
-  codes = uvec4(code_of(0, drive.r, dither_threshold(position, 0u)),
-                code_of(1, drive.g, dither_threshold(position, 1u)),
-                code_of(2, drive.b, dither_threshold(position, 2u)),
+  codes = uvec4(codes_of(drive, dither_thresholds(uvec2(pixel))),
                 (state << 14) | min(uint(loss * 64.0 + 0.5), 0x3fffu));
 }
