@@ -66,12 +66,12 @@ vec4 map_to_gamut(vec3 target, vec3 drive, float g, int steps) {
 
   // Along the way the powers are linear, and the drive is linear in the cones.
   mat3 powers_from_ipt = inverse(kIptFromPowers);
-  vec3 powers_at_anchor = powers_from_ipt * anchor;
+  vec3 powers_at_anchor = vec3(anchor.x);  // on the axis the three are equal
   vec3 powers_along_way = powers_from_ipt * way;
   mat3 drive_from_cones = mat3(constants.drive_from_cones) / g;
   float kept = 0.0;
   float part = 0.5;
-  vec3 mapped = drive_from_cones * signed_power(powers_at_anchor, 1.0 / kIptExponent) - offset;
+  vec3 mapped = neutral * pow(anchor.x, 1.0 / kIptExponent) - offset;
   // A count that is no constant keeps compilers from unrolling: software rasterisers do not skip a
   // branch that no pixel takes, but they leave a loop.
   for (int i = 0; i < steps; ++i) {
