@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
+#include <functional>
 
 #include "btf/models/components.h"
 #include "btf/models/dichromatic_lpca/dichromatic_lpca.h"
@@ -64,7 +64,11 @@ Result<const Model*> find_model(std::string_view name) {
 Status save_material(const Material& material,
                      const std::filesystem::path& path,
                      const std::map<std::string, std::string>& provenance) {
-  const Material::Contents contents = material.contents();
+  Material::Contents contents = material.contents();
+  // Wide elements first: then every tensor is aligned whatever the sizes.
+  std::ranges::stable_sort(contents.tensors, std::greater{}, [](const auto& tensor) {
+    return size_of(tensor.spec.dtype);
+  });
   std::map<std::string, std::string> metadata = provenance;
   for (const auto& [key, value] : contents.metadata) metadata[key] = value;
   metadata["format"] = kFormat;

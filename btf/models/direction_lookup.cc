@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "base/result.h"
 #include "btf/elevated_concentric.h"
@@ -52,15 +53,13 @@ DirectionLookup::DirectionLookup(const DirectionSet& directions, DirectionRole r
       ++region;
     if (region == triangles) {
       const DirectionWeights exact = reference.weights(centre);
+      const auto along = edge_region(directions, centre, exact);
       const std::pair edge{exact.index[0], exact.index[1]};
-      const auto known = edge_regions.find(edge);
-      if (known != edge_regions.end()) {
-        region = known->second;
-      } else {
-        region = regions_.size();
-        bool whole_edge = false;
-        regions_.push_back(outside_region(directions, centre, exact, whole_edge));
-        if (whole_edge) edge_regions[edge] = region;
+      const auto known = along ? edge_regions.find(edge) : edge_regions.end();
+      region = known != edge_regions.end() ? known->second : regions_.size();
+      if (region == regions_.size()) {
+        regions_.push_back(along ? *along : fixed_region(directions, centre, exact));
+        if (along) edge_regions[edge] = region;
       }
     }
     VENEER_CHECK(region <= 0xFFFF);
@@ -94,34 +93,38 @@ void DirectionLookup::add_triangles(const DirectionSet& directions,
   }
 }
 
-// Along a border edge, weights are those of its point at the direction's azimuth; `whole_edge` says
-// that this form holds, and with it for every cell beyond that edge. Where the reference goes to
-// the nearest point instead, the weights at the centre serve the cell.
-DirectionLookup::Region DirectionLookup::outside_region(const DirectionSet& directions,
-                                                        const Direction& centre,
-                                                        const DirectionWeights& exact,
-                                                        bool& whole_edge) const {
-  const auto [a, b, c] = exact.index;
-  Region region{.index = {a, b, c}};
-  const Direction& from = directions[static_cast<std::size_t>(a)];
-  const Direction& to = directions[static_cast<std::size_t>(b)];
-  if (role_ == DirectionRole::kLight)
-    region.border_cosines = Eigen::Vector3d(from.z(), to.z(), to.z()).cast<float>();
+// Beyond a border edge: the weights of its point at the direction's azimuth. Nothing where the
+// reference does otherwise at `centre`.
+std::optional<DirectionLookup::Region> DirectionLookup::edge_region(
+    const DirectionSet& directions, const Direction& centre, const DirectionWeights& exact) const {
+  Region region = fixed_region(directions, centre, exact);
   Eigen::Matrix2d edge;
-  edge << from.head<2>(), to.head<2>();
-  if (a != b && std::abs(edge.determinant()) > kNoWeight) {
-    const Eigen::Matrix2d inverse = edge.inverse();
-    const Eigen::Vector2d weight = inverse * centre.head<2>();
-    whole_edge = weight.minCoeff() >= -kNoWeight &&
-                 std::abs(weight[0] / weight.sum() - exact.weight[0]) < kSameWeight;
-    if (whole_edge) {
-      region.weights_from_direction.topLeftCorner<2, 2>() = inverse.cast<float>();
-      return region;
-    }
+  for (int i = 0; i < 2; ++i)
+    edge.col(i) =
+        directions[static_cast<std::size_t>(region.index[static_cast<std::size_t>(i)])].head<2>();
+  if (!(std::abs(edge.determinant()) > kNoWeight)) return {};
+  const Eigen::Matrix2d inverse = edge.inverse();
+  const Eigen::Vector2d weight = inverse * centre.head<2>();
+  if (weight.minCoeff() < -kNoWeight ||
+      std::abs(weight[0] / weight.sum() - exact.weight[0]) > kSameWeight)
+    return {};
+  region.weights_from_direction.setZero();
+  region.weights_from_direction.topLeftCorner<2, 2>() = inverse.cast<float>();
+  return region;
+}
+
+// The weights at `centre` for a whole cell.
+DirectionLookup::Region DirectionLookup::fixed_region(const DirectionSet& directions,
+                                                      const Direction& centre,
+                                                      const DirectionWeights& exact) const {
+  Region region{.index = exact.index};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    region.weights_from_direction.row(row) = (exact.weight[i] * centre).cast<float>();
+    if (role_ == DirectionRole::kLight)
+      region.border_cosines[row] =
+          static_cast<float>(directions[static_cast<std::size_t>(exact.index[i])].z());
   }
-  for (int i = 0; i < 3; ++i)
-    region.weights_from_direction.row(i) =
-        (exact.weight[static_cast<std::size_t>(i)] * centre).cast<float>();
   return region;
 }
 

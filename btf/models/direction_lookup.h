@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "btf/model_shader.h"
@@ -40,10 +41,12 @@ class DirectionLookup {
     Eigen::Vector3f border_cosines = Eigen::Vector3f::Zero();
   };
   void add_triangles(const DirectionSet& directions, const SphericalInterpolator& reference);
-  [[nodiscard]] Region outside_region(const DirectionSet& directions,
-                                      const Direction& centre,
-                                      const DirectionWeights& exact,
-                                      bool& whole_edge) const;
+  [[nodiscard]] std::optional<Region> edge_region(const DirectionSet& directions,
+                                                  const Direction& centre,
+                                                  const DirectionWeights& exact) const;
+  [[nodiscard]] Region fixed_region(const DirectionSet& directions,
+                                    const Direction& centre,
+                                    const DirectionWeights& exact) const;
 
   DirectionRole role_;
   std::vector<std::uint16_t> cells_;  // row by row; the first row is the smallest second coordinate

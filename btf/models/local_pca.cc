@@ -26,7 +26,8 @@ constexpr int kOversampling = 6;
 // Lloyd's algorithm ends when an iteration gains less than this part of the error.
 constexpr double kLeastGain = 1e-4;
 constexpr double kFloatResolution = 1e-7;
-constexpr int kStarts = 6;
+constexpr int kStarts = 4;
+constexpr int kSwaps = 48;
 constexpr double kLeastKMeansGain = 1e-3;
 constexpr int kMostKMeansIterations = 25;
 // Eigenvalues under this part of the largest are rounding, not data: of a Gram matrix in float, and
@@ -255,11 +256,13 @@ class Lloyd {
       directions_.emplace_back(
           RowMatrix::Zero(clusters * options.components[p], projection.ranges[p].count));
     norms_ = projection.coordinates.rowwise().squaredNorm();
+    members_.resize(static_cast<std::size_t>(clusters));
+    errors_.resize(static_cast<std::size_t>(norms_.size()));
   }
 
-  /// The best of several starts: they end up to a tenth apart in squared error, and cost little.
+  /// The best of several starts, which end up to a tenth apart in squared error, improved by swaps.
   std::vector<int> run(Progress& progress, int& iterations) {
-    progress.start("clusters", kStarts);
+    progress.start("clusters", kStarts + kSwaps);
     Pcg32 random(options_.seed, 2);
     std::vector<int> best;
     double least = std::numeric_limits<double>::infinity();
@@ -274,11 +277,50 @@ class Lloyd {
       }
       progress.advance();
     }
+    for (int trial = 0; trial < kSwaps && least > 0.0; ++trial) {
+      std::vector<int> cluster = best;
+      int done = 0;
+      swap_cluster(cluster, random);
+      const double error = improve(cluster, done);
+      if (error < least) {
+        least = error;
+        best = std::move(cluster);
+        iterations += done;
+      }
+      progress.advance();
+    }
     progress.finish(fmt::format("{} iterations", iterations));
     return best;
   }
 
  private:
+  // Takes a cluster away and gives it to the worse half of another, which Lloyd's algorithm, moving
+  // one row at a time, would never do. Fraenti 2018, "Efficiency of random swap clustering".
+  void swap_cluster(std::vector<int>& cluster, Pcg32& random) {
+    find_directions(cluster);
+    assign(cluster);
+    const auto pick = [&random](double total, const auto& share, std::size_t count) {
+      double left = random.uniform() * total;
+      std::size_t chosen = 0;
+      while (chosen + 1 < count && (left -= share(chosen)) > 0.0) ++chosen;
+      return chosen;
+    };
+    const double total = std::accumulate(errors_.begin(), errors_.end(), 0.0);
+    const auto worst = cluster[pick(
+        total, [&](std::size_t row) { return errors_[row]; }, errors_.size())];
+    const auto removed = static_cast<int>(random.uniform() * clusters_);
+    std::vector<int> rows;
+    for (std::size_t row = 0; row < cluster.size(); ++row)
+      if (cluster[row] == worst) rows.push_back(static_cast<int>(row));
+    std::ranges::sort(rows, [this](int a, int b) {
+      return errors_[static_cast<std::size_t>(a)] > errors_[static_cast<std::size_t>(b)];
+    });
+    rows.resize((rows.size() + 1) / 2);
+    find_directions_of(removed, rows);
+    members_[static_cast<std::size_t>(removed)] = rows;
+    assign(cluster);
+  }
+
   // Alternates until nothing is gained; leaves the best clusters seen, returns their squared error.
   double improve(std::vector<int>& best, int& iterations) {
     std::vector<int> cluster = best;
@@ -299,22 +341,28 @@ class Lloyd {
     return least;
   }
 
+  // Only clusters whose rows changed cost anything.
   void find_directions(const std::vector<int>& cluster) {
-    const auto members = members_of(cluster, clusters_);
+    auto members = members_of(cluster, clusters_);
     parallel_for(clusters_, 1, [&](std::int64_t begin, std::int64_t end) {
-      for (std::int64_t k = begin; k < end; ++k) {
+      for (auto k = static_cast<int>(begin); k < end; ++k) {
         const std::vector<int>& rows = members[static_cast<std::size_t>(k)];
-        for (std::size_t p = 0; p < directions_.size(); ++p) {
-          const Range& range = projection_.ranges[p];
-          RowMatrix points(static_cast<Eigen::Index>(rows.size()), range.count);
-          for (std::size_t i = 0; i < rows.size(); ++i)
-            points.row(static_cast<Eigen::Index>(i)) =
-                projection_.coordinates.row(rows[i]).segment(range.first, range.count);
-          const int count = options_.components[p];
-          directions_[p].middleRows(k * count, count) = leading_directions(points, count);
-        }
+        if (rows != members_[static_cast<std::size_t>(k)]) find_directions_of(k, rows);
       }
     });
+    members_ = std::move(members);
+  }
+
+  void find_directions_of(int k, const std::vector<int>& rows) {
+    for (std::size_t p = 0; p < directions_.size(); ++p) {
+      const Range& range = projection_.ranges[p];
+      RowMatrix points(static_cast<Eigen::Index>(rows.size()), range.count);
+      for (std::size_t i = 0; i < rows.size(); ++i)
+        points.row(static_cast<Eigen::Index>(i)) =
+            projection_.coordinates.row(rows[i]).segment(range.first, range.count);
+      const int count = options_.components[p];
+      directions_[p].middleRows(k * count, count) = leading_directions(points, count);
+    }
   }
 
   // Moves every row to the cluster that keeps most of its energy; returns the squared error.
@@ -331,23 +379,24 @@ class Lloyd {
         kept.col(k) += weights.middleCols(k * count, count).rowwise().squaredNorm();
     }
     double error = 0.0;
-    std::vector<double> errors(static_cast<std::size_t>(rows));
     for (Eigen::Index row = 0; row < rows; ++row) {
       int best = 0;
       const float energy = kept.row(row).maxCoeff(&best);
       cluster[static_cast<std::size_t>(row)] = best;
-      errors[static_cast<std::size_t>(row)] = std::max(0.0, double(norms_[row]) - double(energy));
-      error += errors[static_cast<std::size_t>(row)];
+      errors_[static_cast<std::size_t>(row)] = std::max(0.0, double(norms_[row]) - double(energy));
+      error += errors_[static_cast<std::size_t>(row)];
     }
-    refill_empty_clusters(cluster, errors, clusters_);
+    refill_empty_clusters(cluster, errors_, clusters_);
     return error;
   }
 
   const Projection& projection_;
   const LocalPcaOptions& options_;
   int clusters_;
-  std::vector<RowMatrix> directions_;  // per part, [cluster * components][dimension]
+  std::vector<RowMatrix> directions_;      // per part, [cluster * components][dimension]
+  std::vector<std::vector<int>> members_;  // the rows that each cluster's directions are of
   Eigen::VectorXf norms_;
+  std::vector<double> errors_;  // squared, of each row, after assign()
 };
 
 // One part of one cluster while its eigenvectors are refined in the full space.

@@ -2,6 +2,7 @@
 #include "btf/models/local_pca.h"
 
 #include <Eigen/SVD>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -152,7 +153,8 @@ TEST(LocalPca, IsDefinedAtTheEdges) {
   const RowMatrix one = random_matrix(1, 30, 16);
   const RowMatrix narrow = random_matrix(40, 1, 17);
   const RowMatrix two = random_matrix(2, 5, 18);
-  for (const RowMatrix* data : {&zero, &same, &mixed, &one, &narrow, &two}) {
+  for (const RowMatrix* data :
+       std::initializer_list<const RowMatrix*>{&zero, &same, &mixed, &one, &narrow, &two}) {
     for (const int clusters : {1, 3, 50}) {
       for (const int components : {1, 4}) {
         for (const int basis : {0, 160}) {
@@ -170,10 +172,11 @@ TEST(LocalPca, IsDefinedAtTheEdges) {
           for (const int k : pca.cluster) EXPECT_LT(k, pca.clusters) << where;
           // Each of these has rank 1 at most in any cluster of one row; rank 2 with four
           // components.
-          if (clusters == 50 || components == 4 || data != &two)
+          if (clusters == 50 || components == 4 || data != &two) {
             EXPECT_LE((*data - reconstruct(pca, 0, 0, components)).norm(),
                       kFloatTolerance * std::max(1.0F, data->norm()))
                 << where;
+          }
         }
       }
     }

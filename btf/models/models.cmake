@@ -15,7 +15,12 @@ set(VENEER_MODEL_SRCS
   models/matrix_product.cc
   models/packed_lpca.cc
   models/texel_colours/texel_colours.cc)
-set(VENEER_MODEL_TESTS)
+set(VENEER_MODEL_TESTS
+  models/angular_grid_test.cc
+  models/direction_lookup_test.cc
+  models/local_pca_test.cc
+  models/models_test.cc
+  models/real_material_test.cc)
 set(VENEER_MODEL_SHADERS
   models/dichromatic_lpca/dichromatic_lpca.glsl
   models/direction_lookup.glsl
