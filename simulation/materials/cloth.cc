@@ -77,9 +77,9 @@ HeightField make_cloth(int size, std::uint64_t seed) {
     surface.albedo = (warp_on_top ? Eigen::Vector3f(0.085F, 0.16F, 0.39F)
                                   : Eigen::Vector3f(0.80F, 0.67F, 0.43F)) *
                      tone;
-    // More than bare fibre (0.05): sized and pressed yarn shines.
-    surface.f0 = Eigen::Vector3f::Constant(0.12F);
-    surface.alpha = 0.32F;
+    // More than bare fibre (0.05): a lacquered satin yarn, whose broad highlight is plain to see.
+    surface.f0 = Eigen::Vector3f::Constant(0.30F);
+    surface.alpha = 0.30F;
     return surface;
   };
   return sampled_field(size * kCellsPerTexel, 8.0, height_at, surface_at);
