@@ -60,13 +60,13 @@ TomlReader::TomlReader(std::shared_ptr<Document> document, std::shared_ptr<Node>
 
 namespace {
 
-/// Puts every value of `changes` in the place of the one in `table`, table by table.
+/// Puts every value of `changes` in the place of the one in `table`, table by table; a table that
+/// is written out in braces replaces the whole one.
 void merge(toml::table& table, toml::table&& changes) {
   for (auto&& [key, value] : changes) {
-    toml::table* below = table.get_as<toml::table>(key.str()) != nullptr && value.is_table()
-                             ? table.get_as<toml::table>(key.str())
-                             : nullptr;
-    if (below != nullptr) {
+    toml::table* below = table.get_as<toml::table>(key.str());
+    const toml::table* change = value.as_table();
+    if (below != nullptr && change != nullptr && !change->is_inline()) {
       merge(*below, std::move(*value.as_table()));
     } else {
       table.insert_or_assign(key.str(), std::move(value));

@@ -106,6 +106,8 @@ TEST(TomlReader, LetsSettingsReplaceWhatTheFileSays) {
   EXPECT_FALSE(dither);
   EXPECT_TRUE(compensate);
   EXPECT_EQ(x, 2.5);
+  TomlReader replaced = TomlReader::open(path, {"render = {dither = false}"}).value();
+  EXPECT_FALSE(replaced.table("render").contains("compensate")) << "braces replace the whole table";
   const auto bad = TomlReader::open(path, {"render dither"});
   ASSERT_FALSE(bad);
   EXPECT_NE(bad.error().what.find("render dither"), std::string::npos);

@@ -26,6 +26,7 @@ class CommandLine {
   /// Silent with --quiet; writes to standard error only.
   [[nodiscard]] Progress& progress() { return *progress_; }
   [[nodiscard]] bool json() const { return json_; }
+  [[nodiscard]] bool quiet() const { return quiet_; }
   /// Prints the result: `object` with --json, else `text` (nothing where it is empty).
   void print(const nlohmann::ordered_json& object, const std::string& text) const;
   /// A remark on standard error, unless --quiet.

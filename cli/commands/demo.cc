@@ -143,7 +143,8 @@ Status clear_results(const fs::path& out) {
 Result<int> run_demo(CommandLine& line) {
   DemoOptions options;
   options.etc = default_etc();
-  // What the embedded cloth needs: with 32 clusters and 6+2 scalars dE00 is 0.2 higher on the bench.
+  // What the embedded cloth needs: with 32 clusters and 6+2 scalars dE00 is 0.2 higher on the
+  // bench.
   options.fit.clusters = 64;
   CLI::App& app = line.app();
   app.add_option("--out", options.out, "Where everything is written")->capture_default_str();
@@ -175,6 +176,7 @@ Result<int> run_demo(CommandLine& line) {
   const std::string config = (out / "veneer.toml").string();
   const std::string frames = fmt::format("frames={}", options.frames);
   std::vector<std::string> arguments{"--config", config, "--set", frames};
+  if (line.quiet()) arguments.push_back("--quiet");
   VENEER_TRY(run_program("veneerd", arguments));
   line.note("and once more without compensation, for comparison");
   arguments.insert(arguments.end(),

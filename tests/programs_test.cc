@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: Apache-2.0
+// The programs as a person uses them: exit codes, messages, and nothing half-written.
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <sys/wait.h>
+
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <fstream>
+#include <thread>
+
+#include "base/files.h"
+#include "base/safetensors.h"
+#include "base/testing/temporary_folder.h"
+
+namespace veneer {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Outcome {
+  int exit_code = -1;  // 128 + n for signal n
+  std::string out;     // standard output
+  std::string err;     // standard error
+};
+
+/// Runs `PROGRAM ARGUMENTS`, a shell's line, from the folder of the programs.
+Outcome run(const std::string& line) {
+  const TemporaryFolder folder;
+  const std::string out = (folder.path() / "out").string();
+  const std::string err = (folder.path() / "err").string();
+  const std::string command =
+      fmt::format("exec {}/{} >{} 2>{} </dev/null", VENEER_PROGRAMS, line, out, err);
+  const int status = std::system(command.c_str());
+  Outcome outcome;
+  outcome.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  outcome.out = read_text(out).value_or("");
+  outcome.err = read_text(err).value_or("");
+  return outcome;
+}
+
+testing::AssertionResult fails(const Outcome& outcome, int exit_code, std::string_view message) {
+  if (outcome.exit_code == exit_code && outcome.err.find(message) != std::string::npos) {
+    return testing::AssertionSuccess();
+  }
+  return testing::AssertionFailure() << "expected exit code " << exit_code << " and \"" << message
+                                     << "\", got " << outcome.exit_code << " and\n"
+                                     << outcome.err;
+}
+
+/// A tiny polarised sample set, a material fitted to it, a profile and a run's configuration, made
+/// once by the programs themselves.
+class ProgramsTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder;
+    const std::string here = folder_->path().string();
+    const std::string etc = VENEER_ETC;
+    for (const std::string& line :
+         {"veneer synthesize cloth --size 8 --views 25 --lights 25 --samples 1 -o " + here +
+              "/cloth.btfset",
+          "veneer fit " + here +
+              "/cloth.btfset --model texel-colours --components 3+1 --clusters 2 --angular 8 -o " +
+              here + "/material.safetensors",
+          "veneer calibrate --bench " + etc + "/benches/demo.toml -o " + here + "/profile"}) {
+      const Outcome outcome = run(line);
+      ASSERT_EQ(outcome.exit_code, 0) << line << "\n" << outcome.err;
+    }
+    for (const char* name : {"veneer.toml", "scene.toml"}) {
+      ASSERT_TRUE(
+          write_text(folder_->path() / name, read_text(fs::path(etc) / "demo" / name).value()));
+    }
+  }
+  static void TearDownTestSuite() {
+    delete folder_;
+    folder_ = nullptr;
+  }
+
+  static fs::path at(const std::string& name) { return folder_->path() / name; }
+  static std::string text(const std::string& name) { return at(name).string(); }
+  /// A copy of the sample set that a test may damage.
+  static fs::path copy_of_set(const std::string& name) {
+    fs::remove_all(at(name));
+    fs::copy(at("cloth.btfset"), at(name), fs::copy_options::recursive);
+    return at(name);
+  }
+  static void cut_in_half(const fs::path& file) { fs::resize_file(file, fs::file_size(file) / 2); }
+
+  static inline TemporaryFolder* folder_ = nullptr;
+};
+
+TEST_F(ProgramsTest, UnknownCommandsAndOptionsAreWrongUsage) {
+  EXPECT_TRUE(fails(run("veneer"), 2, "usage"));
+  EXPECT_TRUE(fails(run("veneer paint"), 2, "no command \"paint\""));
+  EXPECT_TRUE(fails(run("veneer fit --colour"), 2, "required"));
+  EXPECT_TRUE(fails(run("veneerd --colour"), 2, "--colour"));
+  EXPECT_EQ(run("veneer --help").exit_code, 0);
+  EXPECT_EQ(run("veneer fit --help").exit_code, 0);
+}
+
+TEST_F(ProgramsTest, MissingFilesAreNamed) {
+  EXPECT_TRUE(
+      fails(run("veneer fit nothing.btfset --model lpca -o " + text("x")), 1, "nothing.btfset"));
+  EXPECT_TRUE(fails(run("veneer evaluate " + text("cloth.btfset") + " nothing.safetensors"),
+                    1,
+                    "nothing.safetensors"));
+  EXPECT_TRUE(fails(run("veneerd --config nothing.toml"), 1, "nothing.toml"));
+  EXPECT_TRUE(fails(run("veneer import rti nothing.lp -o " + text("x")), 1, "nothing.lp"));
+  EXPECT_FALSE(fs::exists(at("x")));
+}
+
+TEST_F(ProgramsTest, UnknownModelsAreAnsweredWithTheKnownOnes) {
+  EXPECT_TRUE(fails(run("veneer fit " + text("cloth.btfset") + " --model magic -o " + text("x")),
+                    2,
+                    "texel-colours"));
+  EXPECT_FALSE(fs::exists(at("x")));
+}
+
+TEST_F(ProgramsTest, OptionsThatAModelCannotDoAreWrongUsage) {
+  for (const char* option :
+       {"--clusters 0", "--components 0", "--components 3+", "--components -1", "--angular 1"}) {
+    EXPECT_TRUE(fails(run("veneer fit " + text("cloth.btfset") + " --model texel-colours -o " +
+                          text("x") + " " + option),
+                      2,
+                      ""))
+        << option;
+    EXPECT_FALSE(fs::exists(at("x"))) << option;
+  }
+}
+
+TEST_F(ProgramsTest, ATruncatedMaterialIsRefused) {
+  fs::copy_file(
+      at("material.safetensors"), at("cut.safetensors"), fs::copy_options::overwrite_existing);
+  cut_in_half(at("cut.safetensors"));
+  EXPECT_TRUE(fails(run("veneer evaluate " + text("cloth.btfset") + " " + text("cut.safetensors")),
+                    1,
+                    "cut short"));
+}
+
+TEST_F(ProgramsTest, ATruncatedSampleSetIsRefused) {
+  const fs::path set = copy_of_set("cut.btfset");
+  cut_in_half(set / "samples.safetensors");
+  EXPECT_TRUE(
+      fails(run("veneer fit " + set.string() + " --model lpca -o " + text("x")), 1, "cut short"));
+  EXPECT_FALSE(fs::exists(at("x")));
+}
+
+TEST_F(ProgramsTest, ASetWhoseSamplesDoNotMatchItsDirectionsIsRefused) {
+  const fs::path set = copy_of_set("short.btfset");
+  const std::string views = read_text(set / "views.csv").value();
+  ASSERT_TRUE(
+      write_text(set / "views.csv", views.substr(0, views.rfind('\n', views.size() - 2) + 1)));
+  EXPECT_TRUE(
+      fails(run("veneer fit " + set.string() + " --model lpca -o " + text("x")), 1, "samples"));
+  EXPECT_FALSE(fs::exists(at("x")));
+}
+
+TEST_F(ProgramsTest, SamplesThatAreNoNumbersAreRefusedWithTheirPlace) {
+  const fs::path set = copy_of_set("nan.btfset");
+  std::fstream file(set / "samples.safetensors", std::ios::in | std::ios::out | std::ios::binary);
+  const auto end = static_cast<std::streamoff>(fs::file_size(set / "samples.safetensors"));
+  file.seekp(end - 2);
+  file.write("\x00\x7e", 2);  // float16 NaN, the last sample of the last texel
+  file.close();
+  EXPECT_TRUE(fails(
+      run("veneer fit " + set.string() + " --model texel-colours --components 3+1 -o " + text("x")),
+      1,
+      "63"));
+  EXPECT_FALSE(fs::exists(at("x")));
+}
+
+TEST_F(ProgramsTest, AMeshWithoutTextureCoordinatesIsRefused) {
+  ASSERT_TRUE(write_text(at("bare.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
+  std::string scene = read_text(at("scene.toml")).value();
+  scene.replace(scene.find("\"sphere\""), 8, "\"bare.obj\"");
+  ASSERT_TRUE(write_text(at("bare.toml"), scene));
+  EXPECT_TRUE(fails(run("veneerd --config " + text("veneer.toml") +
+                        " --set 'scene=\"bare.toml\"' --set frames=1"),
+                    1,
+                    "texture coordinates"));
+}
+
+TEST_F(ProgramsTest, UnknownKeysAreNamedWithTheirLine) {
+  std::string config = read_text(at("veneer.toml")).value();
+  ASSERT_TRUE(write_text(at("wrong.toml"), "framerate_hz = 60\n" + config));
+  EXPECT_TRUE(fails(
+      run("veneerd --config " + text("wrong.toml")), 2, "wrong.toml:1: framerate_hz: unknown key"));
+  EXPECT_TRUE(
+      fails(run("veneerd --config " + text("veneer.toml") + " --set tracker.rate=1"), 2, "rate"));
+  const std::string scene = read_text(at("scene.toml")).value();
+  ASSERT_TRUE(write_text(at("odd.toml"), scene + "\ncolor = 3\n"));
+  EXPECT_TRUE(fails(
+      run("veneerd --config " + text("veneer.toml") + " --set 'scene=\"odd.toml\"'"), 2, "color"));
+}
+
+TEST_F(ProgramsTest, ADamagedProfileIsRefused) {
+  fs::remove_all(at("bad-profile"));
+  fs::copy(at("profile"), at("bad-profile"), fs::copy_options::recursive);
+  cut_in_half(at("bad-profile") / "profile.json");
+  EXPECT_TRUE(
+      fails(run("veneerd --config " + text("veneer.toml") + " --set 'profile=\"bad-profile\"'"),
+            1,
+            "profile.json"));
+}
+
+TEST_F(ProgramsTest, JsonIsAloneOnStandardOutput) {
+  const Outcome outcome = run("veneer evaluate " + text("cloth.btfset") + " " +
+                              text("material.safetensors") + " --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  for (const char* key : {"epsilon_avg", "epsilon_min", "epsilon_max", "rmse"}) {
+    EXPECT_GE(json.at("encoded").at(key), 0.0) << key;
+    EXPECT_GE(json.at("linear").at(key), 0.0) << key;
+  }
+  EXPECT_GT(json.at("fetches"), 0);
+  EXPECT_NE(outcome.err.find("done in"), std::string::npos) << "progress goes to standard error";
+  EXPECT_TRUE(run("veneer evaluate " + text("cloth.btfset") + " " + text("material.safetensors") +
+                  " --json --quiet")
+                  .err.empty());
+}
+
+TEST_F(ProgramsTest, TheDaemonMakesTheSameFramesTwice) {
+  for (const char* name : {"first", "second"}) {
+    const Outcome outcome =
+        run(fmt::format("veneerd --config {} --set frames=3 --set 'output.folder=\"{}\"' --set "
+                        "'summary=\"{}.json\"'",
+                        text("veneer.toml"),
+                        name,
+                        name));
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  }
+  const auto summary = nlohmann::json::parse(read_text(at("first.json")).value());
+  EXPECT_EQ(summary.at("frames"), 3);
+  EXPECT_GT(summary.at("frame_ms_p50"), 0);
+  for (int frame = 0; frame < 3; ++frame) {
+    const std::string name = fmt::format("frame-{:06}.png", frame);
+    EXPECT_EQ(read_text(at("first") / name).value(), read_text(at("second") / name).value())
+        << name;
+  }
+}
+
+TEST_F(ProgramsTest, VerifyingALaterRunSeesWhatCompensationIsWorth) {
+  const std::string config = text("veneer.toml");
+  ASSERT_EQ(run("veneerd --config " + config + " --set frames=2").exit_code, 0);
+  const std::string verify = "veneer verify --json --quiet --bench " VENEER_ETC
+                             "/benches/demo.toml --set " +
+                             text("cloth.btfset") + " --run " + folder_->path().string();
+  const Outcome compensated = run(verify);
+  ASSERT_EQ(compensated.exit_code, 0) << compensated.err;
+  ASSERT_EQ(
+      run("veneerd --config " + config + " --set frames=2 --set render.compensate=false").exit_code,
+      0);
+  const Outcome raw = run(verify);
+  ASSERT_EQ(raw.exit_code, 0) << raw.err;
+  // Eight texels say little about colour; but compensation must be worth a lot even so.
+  EXPECT_GT(nlohmann::json::parse(raw.out).at("de00_mean").get<double>(),
+            2 * nlohmann::json::parse(compensated.out).at("de00_mean").get<double>());
+}
+
+TEST_F(ProgramsTest, TheDaemonStopsCleanlyOnSigterm) {
+  const std::string command = fmt::format(
+      "exec {}/veneerd --quiet --config {} --set 'clock=\"monotonic\"' --set frames=0 "
+      "--set 'output={{driver=\"file\", folder=\"stopped\"}}' --set 'summary=\"stopped.json\"'",
+      VENEER_PROGRAMS,
+      text("veneer.toml"));
+  const pid_t pid = ::fork();
+  ASSERT_GE(pid, 0);
+  if (pid == 0) {
+    ::execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
+    ::_exit(127);
+  }
+  // Not before it runs: a minute is enough even under a sanitizer.
+  constexpr auto kStep = std::chrono::milliseconds(20);
+  for (int i = 0; i < 3000 && !fs::exists(at("stopped") / "frame-000001.png"); ++i) {
+    std::this_thread::sleep_for(kStep);
+  }
+  ASSERT_EQ(::kill(pid, SIGTERM), 0);
+  int status = 0;
+  ASSERT_EQ(::waitpid(pid, &status, 0), pid);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  const auto json = nlohmann::json::parse(read_text(at("stopped.json")).value_or("{}"));
+  EXPECT_GE(json.value("frames", 0), 2);
+}
+
+TEST_F(ProgramsTest, RenderWritesAPictureOrALuminanceImage) {
+  const std::string line = "veneer render " + text("scene.toml") + " --material " +
+                           text("material.safetensors") + " --profile " + text("profile") +
+                           " --eye 0,0.2,0.9 -o ";
+  EXPECT_EQ(run(line + text("frame.png")).exit_code, 0);
+  EXPECT_EQ(run(line + text("frame.exr")).exit_code, 0);
+  EXPECT_TRUE(fs::exists(at("frame.png")));
+  EXPECT_TRUE(fs::exists(at("frame.exr")));
+  EXPECT_TRUE(fails(run(line + text("frame.bmp")), 2, ".png or .exr"));
+}
+
+}  // namespace
+}  // namespace veneer
