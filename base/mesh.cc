@@ -102,6 +102,7 @@ constexpr std::array kBuiltIns{
 Vector3d to_eigen(const aiVector3D& v) { return {v.x, v.y, v.z}; }
 
 Status append(const aiMesh& part, const std::string& origin, Mesh& mesh) {
+  if ((part.mPrimitiveTypes & aiPrimitiveType_TRIANGLE) == 0) return {};  // only points or lines
   if (!part.HasTextureCoords(0)) {
     return fail(
         Errc::kBadFormat,
@@ -109,6 +110,12 @@ Status append(const aiMesh& part, const std::string& origin, Mesh& mesh) {
         "unwrap it (in Blender: UV > Smart UV Project) and export it again",
         origin,
         part.mName.C_Str());
+  }
+  if (!part.HasNormals()) {
+    return fail(Errc::kBadFormat,
+                "reading {}: the part \"{}\" has no normals, and none follow from its triangles",
+                origin,
+                part.mName.C_Str());
   }
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
   for (unsigned i = 0; i < part.mNumVertices; ++i) {
@@ -128,7 +135,7 @@ Status append(const aiMesh& part, const std::string& origin, Mesh& mesh) {
   }
   for (unsigned i = 0; i < part.mNumFaces; ++i) {
     const aiFace& face = part.mFaces[i];
-    if (face.mNumIndices != 3) continue;  // points and lines
+    if (face.mNumIndices != 3) continue;  // points and lines that came with normals of their own
     mesh.triangles.push_back(
         {first + face.mIndices[0], first + face.mIndices[1], first + face.mIndices[2]});
   }
@@ -149,11 +156,12 @@ Result<Mesh> load_mesh(const std::filesystem::path& path_or_name) {
                 origin);
   }
   Assimp::Importer importer;
-  // FlipUVs: files count v from the bottom of the texture, Veneer from its first row.
-  const aiScene* scene = importer.ReadFile(origin,
-                                           aiProcess_Triangulate | aiProcess_GenSmoothNormals |
-                                               aiProcess_JoinIdenticalVertices |
-                                               aiProcess_PreTransformVertices | aiProcess_FlipUVs);
+  // FlipUVs: files count v from the bottom of the texture, Veneer from its first row. SortByPType:
+  // points and lines become parts of their own, which may lack texture coordinates and normals.
+  const aiScene* scene = importer.ReadFile(
+      origin,
+      aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_GenSmoothNormals |
+          aiProcess_JoinIdenticalVertices | aiProcess_PreTransformVertices | aiProcess_FlipUVs);
   if (scene == nullptr)
     return fail(Errc::kBadFormat, "reading the mesh {}: {}", origin, importer.GetErrorString());
   Mesh mesh;

@@ -72,6 +72,32 @@ TEST(LoadMesh, SaysHowToAddTextureCoordinates) {
       << mesh.error().what;
 }
 
+TEST(LoadMesh, SaysThatLinesAloneAreNoSurface) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "lines.obj";
+  ASSERT_TRUE(write_text(path, "v 0 0 0\nv 1 0 0\nvt 0 0\nvt 1 0\nl 1/1 2/2\n"));
+  const auto mesh = load_mesh(path);
+  ASSERT_FALSE(mesh);
+  EXPECT_EQ(mesh.error().code, Errc::kBadFormat);
+  EXPECT_NE(mesh.error().what.find("no triangles"), std::string::npos) << mesh.error().what;
+}
+
+TEST(LoadMesh, PassesOverLinesBesideItsTriangles) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "both.obj";
+  const std::string triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
+  // In the triangle's own part, with texture coordinates and without, and in one of their own
+  // without texture coordinates.
+  for (const char* lines : {"l 1/1 2/2\n", "l 1 2\n", "o stray\nv 2 0 0\nv 3 0 0\nl 4 5\n"}) {
+    ASSERT_TRUE(write_text(path, triangle + lines));
+    const auto mesh = load_mesh(path);
+    ASSERT_TRUE(mesh) << lines << mesh.error().what;
+    EXPECT_EQ(mesh->triangles.size(), 1U) << lines;
+    EXPECT_EQ(mesh->positions.size(), 3U) << lines;
+    for (const Vector3d& normal : mesh->normals) EXPECT_EQ(normal, Vector3d::UnitZ()) << lines;
+  }
+}
+
 TEST(LoadMesh, RefusesMissingEmptyAndForeignFiles) {
   const TemporaryFolder folder;
   EXPECT_EQ(load_mesh("no-such-mesh.obj").error().code, Errc::kNotFound);
