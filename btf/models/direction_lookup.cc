@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <utility>
 
-#include "base/result.h"
 #include "btf/elevated_concentric.h"
 #include "btf/models/concentric_square.h"
 
@@ -18,8 +18,12 @@ namespace {
 // Regions side by side in a row of their texture, four texels each.
 constexpr int kRegionsPerRow = 64;
 constexpr int kTexelsPerRegion = 4;
-// Keeps the quotient defined where the border is the horizon; far under any measured cosine.
+// Keeps quotients defined at the horizon; far under any measured cosine.
 constexpr double kLeastCosine = 1e-6;
+// Weights that are the same in a whole cell are rounded to this part, so that cells share them.
+constexpr double kFixedSteps = 1000.0;
+// Cells that must fit across a triangle for its weights to be linear in them.
+constexpr double kThinCells = 2.0;
 // A weight this small is rounding.
 constexpr double kNoWeight = 1e-7;
 // Weights that agree so far were found in the same way.
@@ -33,42 +37,60 @@ int cell_of(const Direction& direction) {
   return cell(st.y()) * DirectionLookup::kSide + cell(st.x());
 }
 
+DirectionLookup::Region region_of(const std::array<int, 3>& index,
+                                  const Eigen::Matrix3d& weights_from_direction,
+                                  const Eigen::Vector3d& border_cosines) {
+  DirectionLookup::Region region{};
+  auto out = region.begin();
+  for (int i = 0; i < 3; ++i) {
+    for (int axis = 0; axis < 3; ++axis)
+      *out++ = static_cast<float>(weights_from_direction(i, axis));
+    *out++ = static_cast<float>(border_cosines[i]);
+  }
+  std::ranges::transform(index, out, [](int i) { return static_cast<float>(i); });
+  return region;
+}
+
+// The weights at a cell's centre for every direction: all along the normal.
+Eigen::Matrix3d fixed_weights(const DirectionWeights& exact) {
+  Eigen::Matrix3d fixed = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < 3; ++i)
+    fixed(static_cast<Eigen::Index>(i), 2) = std::round(exact.weight[i] * kFixedSteps);
+  return fixed;
+}
+
+// Whether a weight goes from 1 to 0 within about a cell, so that it would mean nothing beyond it.
+bool is_thin(const Eigen::Matrix3d& weights_from_direction) {
+  const double cell = std::sqrt(2.0 * std::numbers::pi) / DirectionLookup::kSide;  // equal areas
+  return !(weights_from_direction.rowwise().norm().maxCoeff() * kThinCells * cell < 1.0);
+}
+
 }  // namespace
 
 DirectionLookup::DirectionLookup(const DirectionSet& directions, DirectionRole role) : role_(role) {
   const SphericalInterpolator reference(directions, role);
-  add_triangles(directions, reference);
-  const std::size_t triangles = regions_.size();
-
-  std::map<std::pair<int, int>, std::size_t> edge_regions;
-  cells_.resize(static_cast<std::size_t>(kSide) * kSide);
-  for (int cell = 0; cell < kSide * kSide; ++cell) {
-    const int row = cell / kSide;
-    const Direction centre =
-        direction_from_square({(cell % kSide + 0.5) / kSide, (row + 0.5) / kSide});
-    std::size_t region = 0;
-    while (region < triangles &&
-           (regions_[region].weights_from_direction.cast<double>() * centre).minCoeff() <
-               -kNoWeight)
-      ++region;
-    if (region == triangles) {
+  const std::map<std::array<int, 3>, Triangle> triangles = find_triangles(directions, reference);
+  std::map<Region, std::uint16_t> known;
+  for (int row = 0; row < kSide; ++row)
+    for (int column = 0; column < kSide; ++column) {
+      const Direction centre = direction_from_square({(column + 0.5) / kSide, (row + 0.5) / kSide});
       const DirectionWeights exact = reference.weights(centre);
-      const auto along = edge_region(directions, centre, exact);
-      const std::pair edge{exact.index[0], exact.index[1]};
-      const auto known = along ? edge_regions.find(edge) : edge_regions.end();
-      region = known != edge_regions.end() ? known->second : regions_.size();
-      if (region == regions_.size()) {
-        regions_.push_back(along ? *along : fixed_region(directions, centre, exact));
-        if (along) edge_regions[edge] = region;
-      }
+      const auto triangle = triangles.find(exact.index);
+      const Region region =
+          triangle == triangles.end() ? border_region(directions, centre, exact)
+          : is_thin(triangle->second.weights)
+              ? region_of(exact.index, fixed_weights(exact), triangle->second.cosines)
+              : region_of(exact.index, triangle->second.weights, triangle->second.cosines);
+      // There are no more regions than cells, so 16 bits hold every number.
+      const auto [entry, added] =
+          known.emplace(region, static_cast<std::uint16_t>(regions_.size()));
+      if (added) regions_.push_back(region);
+      cells_.push_back(entry->second);
     }
-    VENEER_CHECK(region <= 0xFFFF);
-    cells_[static_cast<std::size_t>(cell)] = static_cast<std::uint16_t>(region);
-  }
 }
 
-void DirectionLookup::add_triangles(const DirectionSet& directions,
-                                    const SphericalInterpolator& reference) {
+std::map<std::array<int, 3>, DirectionLookup::Triangle> DirectionLookup::find_triangles(
+    const DirectionSet& directions, const SphericalInterpolator& reference) const {
   const auto at = [&](int i) -> const Direction& {
     return directions[static_cast<std::size_t>(i)];
   };
@@ -79,64 +101,59 @@ void DirectionLookup::add_triangles(const DirectionSet& directions,
   for (const auto& triangle : reference.triangles())
     for (std::size_t i = 0; i < 3; ++i) ++uses[edge(triangle, i)];
 
+  std::map<std::array<int, 3>, Triangle> triangles;
   for (const auto& triangle : reference.triangles()) {
-    Region region{.index = triangle};
     Eigen::Matrix3d corners;
+    Eigen::Vector3d cosines = Eigen::Vector3d::Zero();
     for (std::size_t i = 0; i < 3; ++i) {
       corners.col(static_cast<Eigen::Index>(i)) = at(triangle[i]);
       const auto [a, b] = edge(triangle, i);
       if (role_ == DirectionRole::kLight && uses[{a, b}] == 1)
-        region.border_cosines.setConstant(static_cast<float>(std::min(at(a).z(), at(b).z())));
+        cosines.setConstant(std::min(at(a).z(), at(b).z()));
     }
-    region.weights_from_direction = corners.inverse().cast<float>();
-    regions_.push_back(region);
+    triangles[triangle] = {corners.inverse(), cosines};
   }
+  return triangles;
 }
 
-// Beyond a border edge: the weights of its point at the direction's azimuth. Nothing where the
-// reference does otherwise at `centre`.
-std::optional<DirectionLookup::Region> DirectionLookup::edge_region(
-    const DirectionSet& directions, const Direction& centre, const DirectionWeights& exact) const {
-  Region region = fixed_region(directions, centre, exact);
+DirectionLookup::Region DirectionLookup::border_region(const DirectionSet& directions,
+                                                       const Direction& centre,
+                                                       const DirectionWeights& exact) const {
+  const auto at = [&](std::size_t i) -> const Direction& {
+    return directions[static_cast<std::size_t>(exact.index[i])];
+  };
+  Eigen::Vector3d cosines = Eigen::Vector3d::Zero();
+  if (role_ == DirectionRole::kLight) cosines = {at(0).z(), at(1).z(), at(2).z()};
+
+  // The weights of the edge's point at the direction's azimuth, if the reference takes that too.
   Eigen::Matrix2d edge;
-  for (int i = 0; i < 2; ++i)
-    edge.col(i) =
-        directions[static_cast<std::size_t>(region.index[static_cast<std::size_t>(i)])].head<2>();
-  if (!(std::abs(edge.determinant()) > kNoWeight)) return {};
-  const Eigen::Matrix2d inverse = edge.inverse();
-  const Eigen::Vector2d weight = inverse * centre.head<2>();
-  if (weight.minCoeff() < -kNoWeight ||
-      std::abs(weight[0] / weight.sum() - exact.weight[0]) > kSameWeight)
-    return {};
-  region.weights_from_direction.setZero();
-  region.weights_from_direction.topLeftCorner<2, 2>() = inverse.cast<float>();
-  return region;
-}
-
-// The weights at `centre` for a whole cell.
-DirectionLookup::Region DirectionLookup::fixed_region(const DirectionSet& directions,
-                                                      const Direction& centre,
-                                                      const DirectionWeights& exact) const {
-  Region region{.index = exact.index};
-  for (std::size_t i = 0; i < 3; ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    region.weights_from_direction.row(row) = (exact.weight[i] * centre).cast<float>();
-    if (role_ == DirectionRole::kLight)
-      region.border_cosines[row] =
-          static_cast<float>(directions[static_cast<std::size_t>(exact.index[i])].z());
+  edge << at(0).head<2>(), at(1).head<2>();
+  if (std::abs(edge.determinant()) > kNoWeight) {
+    Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
+    matrix.topLeftCorner<2, 2>() = edge.inverse();
+    const Eigen::Vector3d weight = matrix * centre;
+    if (weight.minCoeff() >= -kNoWeight &&
+        std::abs(weight[0] / weight.sum() - exact.weight[0]) <= kSameWeight)
+      return region_of(exact.index, matrix, cosines);
   }
-  return region;
+  return region_of(exact.index, fixed_weights(exact), cosines);
 }
 
 DirectionWeights DirectionLookup::weights(const Direction& direction) const {
   const Region& region = regions_[cells_[static_cast<std::size_t>(cell_of(direction))]];
-  Eigen::Vector3d weight = region.weights_from_direction.cast<double>() * direction;
-  weight /= weight.sum();
-  if (role_ == DirectionRole::kView) return {region.index, {weight[0], weight[1], weight[2]}, 1.0};
-  const double border = std::max(weight.dot(region.border_cosines.cast<double>()), kLeastCosine);
-  return {region.index,
-          {weight[0], weight[1], weight[2]},
-          std::clamp(direction.z() / border, 0.0, 1.0)};
+  const Eigen::Map<const Eigen::Matrix<float, 4, 4, Eigen::RowMajor>> texels(region.data());
+  const Direction above(direction.x(), direction.y(), std::max(direction.z(), kLeastCosine));
+  Eigen::Vector3d weight = (texels.topLeftCorner<3, 3>().cast<double>() * above).cwiseMax(0.0);
+  const double sum = weight.sum();
+  weight = sum > 0.0 ? Eigen::Vector3d(weight / sum) : Eigen::Vector3d::UnitX();
+  DirectionWeights result{.index = {}, .weight = {weight[0], weight[1], weight[2]}, .scale = 1.0};
+  for (std::size_t i = 0; i < 3; ++i)
+    result.index[i] = static_cast<int>(texels(3, static_cast<Eigen::Index>(i)));
+  if (role_ == DirectionRole::kLight) {
+    const double border = weight.dot(texels.col(3).head<3>().cast<double>());
+    result.scale = std::clamp(direction.z() / std::max(border, kLeastCosine), 0.0, 1.0);
+  }
+  return result;
 }
 
 void DirectionLookup::add_textures(const std::string& name,
@@ -158,14 +175,7 @@ void DirectionLookup::add_textures(const std::string& name,
   std::vector<float> values(static_cast<std::size_t>(regions.width) *
                             static_cast<std::size_t>(rows) * 4);
   auto out = values.begin();
-  for (const Region& region : regions_) {
-    for (int i = 0; i < 3; ++i) {
-      out = std::ranges::copy(region.weights_from_direction.row(i), out).out;
-      *out++ = region.border_cosines[i];
-    }
-    for (const int index : region.index) *out++ = static_cast<float>(index);
-    *out++ = 0.0F;
-  }
+  for (const Region& region : regions_) out = std::ranges::copy(region, out).out;
   regions.data = texture_data(values);
   textures.push_back(std::move(regions));
 }

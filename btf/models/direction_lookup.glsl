@@ -16,8 +16,10 @@ DirectionWeights direction_weights(usampler2D cells, sampler2D regions, vec3 dir
   vec4 c = texelFetch(regions, at + ivec2(2, 0), 0);
   DirectionWeights result;
   result.index = ivec3(texelFetch(regions, at + ivec2(3, 0), 0).xyz);
-  vec3 weight = vec3(dot(a.xyz, direction), dot(b.xyz, direction), dot(c.xyz, direction));
-  result.weight = weight / (weight.x + weight.y + weight.z);
+  vec3 above = vec3(direction.xy, max(direction.z, 1e-6));
+  vec3 weight = max(vec3(dot(a.xyz, above), dot(b.xyz, above), dot(c.xyz, above)), 0.0);
+  float sum = weight.x + weight.y + weight.z;
+  result.weight = sum > 0.0 ? weight / sum : vec3(1.0, 0.0, 0.0);
   float border = max(dot(result.weight, vec3(a.w, b.w, c.w)), 1e-6);
   result.scale = clamp(direction.z / border, 0.0, 1.0);
   return result;
