@@ -8,10 +8,8 @@ namespace veneer::simulation {
 
 /// Rings of directions from the normal to 75 degrees, by how many there are:
 /// 25 and 49 in the manner of the Bonn sets, for quick trials; 81 is btf::bonn_directions(); 151 is
-/// the list of the Bonn dome (UBO2014: theta 0, 11, 23.5, 30, 37.5, ... 75 degrees).
-/// Errors: kInvalidOption for any other count, naming these.
-/// Source of 151: Weinmann, Gall, Klein 2014, "Material Classification Based on Training Data
-/// Synthesized Using a BTF Database", the data set's direction list.
+/// the direction list of the UBO2014 dome, via btflib (theta 0, 11, 23.5, 30, 37.5, ... 75
+/// degrees). Errors: kInvalidOption for any other count, naming these.
 [[nodiscard]] Result<btf::DirectionSet> ring_directions(int count);
 
 }  // namespace veneer::simulation

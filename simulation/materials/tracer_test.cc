@@ -233,7 +233,7 @@ TEST(Reciprocity, HoldsForTheTilesMeanWithMaskingShadowsAndBounces) {
   for (Surface& surface : field.surfaces) surface = varnished;
   for (float& height : field.heights) height *= 4.0F;
   const TracedSet set(field, options);
-  constexpr double kNoise = 0.02;  // relative; measured 0.006 at most
+  constexpr double kNoise = 0.02;  // relative
   for (std::size_t a = 0; a < directions.size(); ++a) {
     for (std::size_t b = 0; b < a; ++b) {
       const double there = set.mean(a, b, 0) / directions[b].z();
