@@ -16,7 +16,7 @@ struct Frame {
   /// Drive values as code values of `bits` bits, in the low bits; first row on top.
   ImageView<const Rgb16> codes;
   int bits = 8;
-  /// Luminance target before compensation, XYZ in cd/m^2; empty unless the output asked for it.
+  /// Luminance target before compensation, XYZ in cd/m^2; empty unless the output wants it.
   ImageView<const Rgb32f> target_xyz;
   /// When it is meant to be seen.
   Time display_time;
@@ -27,11 +27,12 @@ class Output {
  public:
   virtual ~Output() = default;
   [[nodiscard]] virtual std::string description() const = 0;
-  /// Whether present() wants pixels at all; reading them back from the GPU costs time.
-  [[nodiscard]] virtual bool wants_pixels() const = 0;
-  /// Whether it also wants Frame::target_xyz.
-  [[nodiscard]] virtual bool wants_target() const { return false; }
-  /// Hands over one frame. Errors: kIo.
+  /// Whether present() wants the pixels of the frame of this number; reading them back from the GPU
+  /// costs time. Always the same answer for the same number.
+  [[nodiscard]] virtual bool wants_pixels(std::uint64_t frame_number) const = 0;
+  /// Whether it also wants its Frame::target_xyz; only where it wants its pixels.
+  [[nodiscard]] virtual bool wants_target(std::uint64_t /*frame_number*/) const { return false; }
+  /// Hands over one frame; views that are not wanted may be empty. Errors: kIo.
   [[nodiscard]] virtual Status present(const Frame& frame) = 0;
   /// After the last frame: waits until all is out.
   [[nodiscard]] virtual Status finish() { return {}; }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <string>
 
 namespace veneer::projector {
@@ -36,8 +37,10 @@ TEST(Outputs, AnUnknownNameIsRefusedWithTheKnownOnes) {
 TEST(NullOutput, WantsNothingAndTakesEverything) {
   auto output = output_of("driver = \"null\"");
   ASSERT_TRUE(output) << output.error().what;
-  EXPECT_FALSE((*output)->wants_pixels());
-  EXPECT_FALSE((*output)->wants_target());
+  for (const std::uint64_t number : {0U, 1U, 60U}) {
+    EXPECT_FALSE((*output)->wants_pixels(number));
+    EXPECT_FALSE((*output)->wants_target(number));
+  }
   EXPECT_FALSE((*output)->description().empty());
   EXPECT_TRUE((*output)->present({}));
   EXPECT_TRUE((*output)->finish());

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "projector/outputs/file/file_output.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -61,17 +63,16 @@ Result<std::unique_ptr<FileOutput>> FileOutput::open(TomlReader& config) {
                 options.folder.string(),
                 error.message());
   }
-  std::ofstream index(options.folder / "frames.jsonl", std::ios::binary);
-  if (!index) {
+  if (::access(options.folder.c_str(), W_OK | X_OK) != 0) {
     return fail(Errc::kIo,
                 "opening the file output: the folder {} cannot be written to; choose another",
                 options.folder.string());
   }
-  return std::unique_ptr<FileOutput>(new FileOutput(std::move(options), std::move(index)));
+  return std::unique_ptr<FileOutput>(new FileOutput(std::move(options)));
 }
 
-FileOutput::FileOutput(FileOutputOptions options, std::ofstream index)
-    : options_(std::move(options)), index_(std::move(index)), writer_([this] { run_writer(); }) {}
+FileOutput::FileOutput(FileOutputOptions options)
+    : options_(std::move(options)), writer_([this] { run_writer(); }) {}
 
 FileOutput::~FileOutput() {
   {
@@ -92,7 +93,7 @@ Status FileOutput::present(const Frame& frame) {
   {
     std::unique_lock lock(mutex_);
     if (error_) return tl::unexpected<Error>(*error_);
-    if (frame.number % options_.every != 0) return {};
+    if (!wants_pixels(frame.number)) return {};
     if (frame.codes.empty() || (options_.target && frame.target_xyz.empty())) {
       return fail(Errc::kBadFormat,
                   "writing frame {}: it has no {}",
@@ -145,6 +146,8 @@ void FileOutput::run_writer() {
 }
 
 Status FileOutput::write(const Job& job) {
+  const std::filesystem::path index_path = options_.folder / "frames.jsonl";
+  if (!index_.is_open()) index_.open(index_path, std::ios::binary);
   const std::string name = fmt::format("frame-{:06}.png", job.number);
   VENEER_TRY(write_codes(options_.folder / name, job));
   std::string line = fmt::format(R"({{"frame":{},"display_time_ns":{},"file":"{}")",
@@ -158,9 +161,8 @@ Status FileOutput::write(const Job& job) {
   }
   index_ << line << "}\n" << std::flush;
   if (!index_) {
-    return fail(Errc::kIo,
-                "writing {}: the system refused it; is the disk full?",
-                (options_.folder / "frames.jsonl").string());
+    return fail(
+        Errc::kIo, "writing {}: the system refused it; is the disk full?", index_path.string());
   }
   return {};
 }

@@ -43,7 +43,9 @@ struct FileOutputOptions {
 ///                      {"frame":123,"display_time_ns":..,"file":"frame-000123.png"}, with
 ///                      "target":"target-000123.exr" where there is one
 ///
-/// Each picture is there whole or not at all, and its line follows it. present() copies the frame
+/// The index of an earlier run is replaced when the first frame is written, not before: a run that
+/// fails on its way there leaves what it found. Each picture is there whole or not at all, and its
+/// line follows it. present() copies the frame
 /// and returns; it waits only while four frames are queued. An error of the writing thread is
 /// returned by the next present() or finish() and all that follow; what is queued behind it is
 /// dropped.
@@ -54,10 +56,14 @@ class FileOutput final : public Output {
   ~FileOutput() override;
 
   [[nodiscard]] std::string description() const override;
-  [[nodiscard]] bool wants_pixels() const override { return true; }
-  [[nodiscard]] bool wants_target() const override { return options_.target; }
-  /// Errors: kIo; kBadFormat for a frame without pixels or target, of no 1 to 16 bits or with a
-  /// code that has more bits.
+  [[nodiscard]] bool wants_pixels(std::uint64_t frame_number) const override {
+    return frame_number % options_.every == 0;
+  }
+  [[nodiscard]] bool wants_target(std::uint64_t frame_number) const override {
+    return options_.target && wants_pixels(frame_number);
+  }
+  /// Errors: kIo; kBadFormat for a wanted frame without pixels or target, of no 1 to 16 bits or
+  /// with a code that has more bits.
   [[nodiscard]] Status present(const Frame& frame) override;
   [[nodiscard]] Status finish() override;
   [[nodiscard]] std::uint64_t waits() const override { return waits_; }
@@ -73,7 +79,7 @@ class FileOutput final : public Output {
   };
   static constexpr std::size_t kQueueLength = 4;
 
-  FileOutput(FileOutputOptions options, std::ofstream index);
+  explicit FileOutput(FileOutputOptions options);
   void run_writer();
   [[nodiscard]] Status write(const Job& job);
   [[nodiscard]] Status write_codes(const std::filesystem::path& path, const Job& job);
@@ -81,7 +87,7 @@ class FileOutput final : public Output {
   FileOutputOptions options_;
   std::uint64_t waits_ = 0;
   // The writing thread's own.
-  std::ofstream index_;
+  std::ofstream index_;  // open from the first frame on
   Image<Rgb8> scratch8_;
   Image<Rgb16> scratch16_;
 

@@ -76,8 +76,8 @@ const Frame& with_views(OwnedFrame& owned) {
 TEST_F(FileOutputTest, EightBitCodesAreWrittenAsTheyAre) {
   auto output = open();
   ASSERT_TRUE(output) << output.error().what;
-  EXPECT_TRUE((*output)->wants_pixels());
-  EXPECT_FALSE((*output)->wants_target());
+  EXPECT_TRUE((*output)->wants_pixels(123));
+  EXPECT_FALSE((*output)->wants_target(123));
   OwnedFrame owned = make_frame(123, 8);
   ASSERT_TRUE((*output)->present(with_views(owned)));
   ASSERT_TRUE((*output)->finish());
@@ -131,7 +131,7 @@ TEST_F(FileOutputTest, ReadsAViewWithPaddingRowByRow) {
 TEST_F(FileOutputTest, TheTargetIsWrittenWhereItWasAskedFor) {
   auto output = open("target = true");
   ASSERT_TRUE(output);
-  EXPECT_TRUE((*output)->wants_target());
+  EXPECT_TRUE((*output)->wants_target(9));
   OwnedFrame owned = make_frame(9, 8);
   ASSERT_TRUE((*output)->present(with_views(owned)));
   ASSERT_TRUE((*output)->finish());
@@ -167,18 +167,46 @@ TEST_F(FileOutputTest, AllFramesAreWrittenInOrderWhateverTheirNumber) {
   EXPECT_EQ(count_files(), static_cast<int>(kFrames) + 1);  // nothing half-written is left
 }
 
-TEST_F(FileOutputTest, EveryNthFrameIsWritten) {
-  auto output = open("every = 4");
+TEST_F(FileOutputTest, EveryNthFrameIsWrittenAndTheOthersNeedNoPixels) {
+  auto output = open("every = 4\ntarget = true");
   ASSERT_TRUE(output);
   for (std::uint64_t n = 0; n < 10; ++n) {
+    EXPECT_EQ((*output)->wants_pixels(n), n % 4 == 0) << n;
+    EXPECT_EQ((*output)->wants_target(n), n % 4 == 0) << n;
     OwnedFrame owned = make_frame(n, 8);
-    ASSERT_TRUE((*output)->present(with_views(owned)));
+    Frame frame = with_views(owned);
+    if (!(*output)->wants_pixels(n)) frame.codes = {};
+    if (!(*output)->wants_target(n)) frame.target_xyz = {};
+    ASSERT_TRUE((*output)->present(frame)) << n;
   }
   ASSERT_TRUE((*output)->finish());
   const std::vector<nlohmann::json> lines = index();
   ASSERT_EQ(lines.size(), 3U);
   EXPECT_EQ(lines[2].at("file"), "frame-000008.png");
-  EXPECT_EQ(count_files(), 4);
+  EXPECT_EQ(count_files(), 7);  // three of each kind and the index
+}
+
+TEST_F(FileOutputTest, TheIndexOfAnEarlierRunStaysUntilAFrameIsWritten) {
+  const std::string earlier = "{\"frame\":7}\n";
+  std::filesystem::create_directories(folder_);
+  ASSERT_TRUE(write_text(folder_ / "frames.jsonl", earlier));
+  {
+    auto output = open("every = 2");
+    ASSERT_TRUE(output) << output.error().what;
+    Frame unwanted;
+    unwanted.number = 1;
+    ASSERT_TRUE((*output)->present(unwanted));
+    ASSERT_TRUE((*output)->finish());
+  }
+  EXPECT_EQ(read_text(folder_ / "frames.jsonl").value(), earlier);
+  auto output = open("every = 2");
+  ASSERT_TRUE(output);
+  OwnedFrame owned = make_frame(2, 8);
+  ASSERT_TRUE((*output)->present(with_views(owned)));
+  ASSERT_TRUE((*output)->finish());
+  const std::vector<nlohmann::json> lines = index();
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_EQ(lines[0].at("frame"), 2);
 }
 
 TEST_F(FileOutputTest, WritesWhatIsQueuedWhenItIsDestroyed) {

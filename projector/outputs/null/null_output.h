@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 
@@ -16,7 +17,7 @@ class NullOutput final : public Output {
   /// Has no keys; never fails.
   [[nodiscard]] static Result<std::unique_ptr<NullOutput>> open(TomlReader& config);
   [[nodiscard]] std::string description() const override { return "null output"; }
-  [[nodiscard]] bool wants_pixels() const override { return false; }
+  [[nodiscard]] bool wants_pixels(std::uint64_t /*frame_number*/) const override { return false; }
   [[nodiscard]] Status present(const Frame& /*frame*/) override { return {}; }
 };
 
