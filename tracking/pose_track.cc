@@ -11,14 +11,17 @@ namespace {
 
 /// Farther out than any room; keeps products of coordinates finite.
 constexpr double kFarthest_m = 1e6;
-/// Two samples closer than this (no tracker reaches 2 kHz) say nothing about a velocity.
+/// Two samples closer than this differ by noise more than by motion: no velocity comes from them.
 constexpr double kShortestSpan_s = 0.5e-3;
 /// How far back the sample before the newest may lie to be used outside the velocity window.
 constexpr double kLongestGap_s = 0.2;
+/// The ring holds this much at the highest rate, that of the fastest simulated tracker.
+constexpr double kLongestWindow_s = 0.1;
+constexpr double kFastestTracker_hz = 10000;
 /// Velocities that have decayed to this part count as gone.
 constexpr double kNothingLeft = 0.05;
 /// A query starts again when the writer has gone over the whole ring in the middle of it, which
-/// takes it 64 samples; it does so at most this often.
+/// takes it 1024 samples; it does so at most this often.
 constexpr int kAttempts = 4;
 
 /// later - earlier in seconds, for any two times.
@@ -94,15 +97,18 @@ Status PredictionOptions::check() const {
   if (!(decay_s > 0) || !std::isfinite(decay_s)) {
     return fail(Errc::kInvalidOption, "decay_s is {}: choose a number above 0", decay_s);
   }
-  if (!(velocity_window_s > 0) || !std::isfinite(velocity_window_s)) {
+  if (!(velocity_window_s > 0) || !(velocity_window_s <= kLongestWindow_s)) {
     return fail(Errc::kInvalidOption,
-                "velocity_window_s is {}: choose a number above 0",
-                velocity_window_s);
+                "velocity_window_s is {}: choose a number above 0, at most {}",
+                velocity_window_s,
+                kLongestWindow_s);
   }
   return {};
 }
 
 PoseTrack::PoseTrack(const PredictionOptions& options) : options_(options) {
+  static_assert(kLongestWindow_s * kFastestTracker_hz < kSlots - 1,
+                "the ring holds a whole window while its oldest sample is being replaced");
   VENEER_CHECK(options.check().has_value());
 }
 

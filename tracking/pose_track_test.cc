@@ -103,6 +103,8 @@ TEST(PredictionOptions, RefuseWhatHasNoMeaning) {
     EXPECT_FALSE((PredictionOptions{.decay_s = bad}.check())) << bad;
     EXPECT_FALSE((PredictionOptions{.velocity_window_s = bad}.check())) << bad;
   }
+  EXPECT_TRUE((PredictionOptions{.velocity_window_s = 0.1}.check()));
+  EXPECT_FALSE((PredictionOptions{.velocity_window_s = 0.101}.check())) << "longer than the ring";
 }
 
 TEST(PoseTrack, KnowsNothingAtFirst) {
@@ -129,13 +131,62 @@ TEST(PoseTrack, PredictsEvenMotionExactly) {
 }
 
 TEST(PoseTrack, PredictsATurnOfMoreThanHalfARoundInItsWindow) {
-  PoseTrack track{{.velocity_window_s = 0.2}};
-  const EvenMotion spin{.velocity = Vector3d::Zero(), .angular_velocity = Vector3d(0, 0, 30)};
+  PoseTrack track{{.velocity_window_s = 0.1}};
+  const EvenMotion spin{.velocity = Vector3d::Zero(), .angular_velocity = Vector3d(0, 0, 60)};
   feed(
       track, [&](double s) { return spin.at(s); }, 100);
   const double when = 99 / kRate_hz + 0.03;
   expect_near(
-      track.at(at_seconds(when)), spin.at(when), 40 * kRoundingTolerance, when);  // 30 rad/s x 1 ns
+      track.at(at_seconds(when)), spin.at(when), 80 * kRoundingTolerance, when);  // 60 rad/s x 1 ns
+}
+
+/// The velocity of a body that stood until `bend_s` and has moved at 1 m/s since, by a line of
+/// least squares through samples of `rate_hz` over `window_s`.
+double slope_past_a_bend(double window_s, double rate_hz, double bend_s, double newest_s) {
+  const double count = std::round(window_s * rate_hz) + 1;
+  double t = 0;
+  double tt = 0;
+  double x = 0;
+  double tx = 0;
+  for (int i = 0; i < count; ++i) {
+    const double time = -i / rate_hz;
+    const double place = std::max(0.0, newest_s + time - bend_s);
+    t += time;
+    tt += time * time;
+    x += place;
+    tx += time * place;
+  }
+  return (count * tx - t * x) / (count * tt - t * t);
+}
+
+TEST(PoseTrack, HoldsAWholeVelocityWindowOfTheFastestTracker) {
+  constexpr double kFastest_hz = 10000;
+  constexpr double kBend_s = 0.28;
+  constexpr double kNewest_s = 0.2999;
+  for (const double window_s : {0.03, 0.1}) {
+    PoseTrack track{{.velocity_window_s = window_s}};
+    const auto bent = [&](double s) {
+      return RigidTransform{Quaterniond::Identity(), Vector3d(std::max(0.0, s - kBend_s), 0, 0)};
+    };
+    feed(track, bent, 3000, kFastest_hz);
+    // A window cut short by the ring would see less of the standstill.
+    EXPECT_NEAR(track.at(at_seconds(kNewest_s)).velocity.x(),
+                slope_past_a_bend(window_s, kFastest_hz, kBend_s, kNewest_s),
+                1e-6)
+        << window_s;
+  }
+}
+
+TEST(PoseTrack, OfAFasterTrackerTheWindowIsWhatTheRingHolds) {
+  constexpr double kRate = 100000;
+  PoseTrack track{{.velocity_window_s = 0.1}};
+  const auto bent = [](double s) {
+    return RigidTransform{Quaterniond::Identity(), Vector3d(std::max(0.0, s - 0.025), 0, 0)};
+  };
+  feed(track, bent, 3000, kRate);
+  EXPECT_NEAR(track.at(at_seconds(0.02999)).velocity.x(),
+              slope_past_a_bend(1023 / kRate, kRate, 0.025, 0.02999),
+              1e-6);
 }
 
 TEST(PoseTrack, InterpolatesEvenMotionExactly) {
@@ -157,12 +208,12 @@ TEST(PoseTrack, InterpolatesEvenMotionExactly) {
 
 TEST(PoseTrack, HoldsTheOldestPoseBeforeItsHistory) {
   PoseTrack track{{}};
-  feed(track, circling, 200);
+  feed(track, circling, 1200);
   const PoseEstimate estimate = track.at(at_seconds(0));
   EXPECT_EQ(estimate.origin, PoseOrigin::kHeld);
   EXPECT_EQ(estimate.velocity, Vector3d::Zero().eval());
-  // One of the 64 newest, the oldest of which the next sample will replace.
-  expect_near(estimate, circling(137 / kRate_hz), 1.5 / kRate_hz, 0);
+  // One of the 1024 newest, the oldest of which the next sample will replace.
+  expect_near(estimate, circling(177 / kRate_hz), 1.5 / kRate_hz, 0);
 }
 
 TEST(PoseTrack, MeetsTheAcceptanceBoundOnACircle) {
@@ -384,7 +435,7 @@ TEST(PoseTrack, HandsOverWholePosesBetweenThreads) {
   int lost = 0;
   while (!done) {
     // Ahead, and all the way to the old end, where reader and writer meet in one slot.
-    const Time when{Duration{newest.load() + 1000000 - asked % 64 * 1000000L - asked % 3}};
+    const Time when{Duration{newest.load() + 1000000 - asked % 1024 * 1000000L - asked % 3}};
     const PoseEstimate estimate = track.at(when);
     const Vector3d& p = estimate.world_from_body.translation;
     const Vector3d v = estimate.world_from_body.rotation.vec();
