@@ -21,9 +21,9 @@ namespace veneer::simulation {
 /// What an eye pixel sees.
 enum class Coverage : std::uint8_t {
   kOutside,  ///< nothing of the object
-  kUnlit,    ///< only object, none of it within the projector's reach
-  kPartial,  ///< an edge: of the object, or of what the projector reaches
-  kCovered,  ///< only object, all of it within reach
+  kUnlit,    ///< only object, none of it lit by the projector
+  kPartial,  ///< an edge of the object
+  kCovered,  ///< only object, at least a part of it lit
 };
 
 /// One ray of an eye pixel that met the object.
@@ -78,16 +78,18 @@ struct DifferenceStatistics {
   double max = 0;
 };
 
-/// What the eye received held against what the material would have sent.
+/// What the eye received held against what the material would have sent. All pixels that lie
+/// wholly on the object are covered, however much or little of the projector's light they get: what
+/// it cannot reach is counted as out of gamut, not left out.
 struct Comparison {
   Xyz white = Xyz::Zero();       ///< against which dE00 was computed, see Bench::white
-  Image<float> de00;             ///< NaN where the pixel is not covered
+  Image<float> de00;             ///< NaN where the pixel is not wholly on the object
   Image<std::uint8_t> in_gamut;  ///< 1 where covered and reachable by the hidden truth
   DifferenceStatistics within_gamut;
   DifferenceStatistics covered;
   double in_gamut_fraction = 0;  ///< of the covered pixels
-  std::int64_t partial = 0;      ///< pixels left out because they lie on an edge
-  std::int64_t unlit = 0;        ///< pixels left out because the projector does not reach them
+  std::int64_t partial = 0;      ///< pixels left out because they lie on an edge of the object
+  std::int64_t unlit = 0;        ///< covered pixels that get no light of the projector
   std::int64_t target_over_white = 0;  ///< covered pixels with L* > 100
   std::int64_t received_over_white = 0;
 };
@@ -115,12 +117,10 @@ class Bench {
   [[nodiscard]] const BenchTruth& truth() const;
 
   /// Traces an eye's picture of the object: BenchTruth::eye.samples^2 rays a pixel, on a regular
-  /// grid.
-  /// @param geometry_floor  the least G at which a point counts as within the projector's reach.
+  /// grid. A ray counts as lit where G > 0.
   /// Errors: kInvalidOption (a pose that is not finite, an eye at the object's origin).
   [[nodiscard]] Result<EyeView> look(const RigidTransform& world_from_object,
-                                     const Eigen::Vector3d& eye_in_world,
-                                     double geometry_floor = 0.05) const;
+                                     const Eigen::Vector3d& eye_in_world) const;
 
   /// What the eye receives of a projected frame: XYZ in cd/m^2, mean of the pixel; the space
   /// around the object is black. Errors: kInvalidOption (size or codes do not fit the projector).
@@ -143,7 +143,10 @@ class Bench {
   [[nodiscard]] Result<Xyz> white(const RigidTransform& world_from_object) const;
 
   /// Whether some drive in [0,1]^3, the same over all that lights the pixel, makes the object send
-  /// `xyz` (cd/m^2) where the mean geometry is `geometry`.
+  /// `xyz` (cd/m^2) where the mean geometry is `geometry`; for 0 this is what the ambient light
+  /// alone sends. A hundred-thousandth of `xyz` is taken as rounding, so that the answer holds at
+  /// any geometry however small.
+  /// @param geometry  >= 0; false for any other, as for an `xyz` that is not finite.
   [[nodiscard]] bool reachable(const Xyz& xyz, double geometry) const;
 
   /// @param target  what should be received, @param received  what is, both of the view's size.

@@ -36,11 +36,11 @@ double eye_pixel(const EyeTruth& eye) {
   return 2.0 * std::tan(0.5 * to_radians(Degrees{eye.vertical_fov_deg}).value) / eye.height;
 }
 
-/// @param hits, reached  rays of the pixel that met the object, and those of them within reach.
-Coverage coverage_of(int rays, int hits, int reached) {
+/// @param hits, lit  rays of the pixel that met the object, and those of them that get light.
+Coverage coverage_of(int rays, int hits, int lit) {
   if (hits == 0) return Coverage::kOutside;
-  if (hits == rays && reached == 0) return Coverage::kUnlit;
-  return reached == rays ? Coverage::kCovered : Coverage::kPartial;
+  if (hits < rays) return Coverage::kPartial;
+  return lit == 0 ? Coverage::kUnlit : Coverage::kCovered;
 }
 
 }  // namespace
@@ -94,8 +94,7 @@ Result<std::unique_ptr<Bench>> Bench::create(const BenchTruth& truth, Mesh mesh)
 const BenchTruth& Bench::truth() const { return state_->truth; }
 
 Result<EyeView> Bench::look(const RigidTransform& world_from_object,
-                            const Eigen::Vector3d& eye_in_world,
-                            double geometry_floor) const {
+                            const Eigen::Vector3d& eye_in_world) const {
   const Eigen::Vector3d& centre = world_from_object.translation;
   constexpr double kLeastDistance_m = 1e-3;
   if (!world_from_object.matrix().allFinite() ||
@@ -122,7 +121,7 @@ Result<EyeView> Bench::look(const RigidTransform& world_from_object,
   const double pixel_side = eye_pixel(eye);
   const auto trace_pixel = [&](int x, int y, std::vector<EyeSample>& row) {
     int hits = 0;
-    int reached = 0;
+    int lit = 0;
     for (int j = 0; j < eye.samples; ++j)
       for (int i = 0; i < eye.samples; ++i) {
         const Eigen::Vector3d ray((x + (i + 0.5) / eye.samples - 0.5 * eye.width) * pixel_side,
@@ -132,9 +131,9 @@ Result<EyeView> Bench::look(const RigidTransform& world_from_object,
         if (!hit) continue;
         row.push_back(state_->light(*hit, world_from_object, lens_in_object));
         ++hits;
-        if (row.back().geometry >= geometry_floor) ++reached;
+        if (row.back().geometry > 0) ++lit;
       }
-    view.coverage(x, y) = coverage_of(view.rays_per_pixel, hits, reached);
+    view.coverage(x, y) = coverage_of(view.rays_per_pixel, hits, lit);
   };
   parallel_for(eye.height, 1, [&](std::int64_t begin, std::int64_t end) {
     for (auto y = static_cast<std::size_t>(begin); y < static_cast<std::size_t>(end); ++y)

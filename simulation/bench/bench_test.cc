@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -268,7 +269,71 @@ TEST(Bench, EveryDriveIsReachableAndMoreThanWhiteIsNot) {
       }
   }
   EXPECT_GT(tried, 200);
-  EXPECT_FALSE(bench->reachable({1, 1, 1}, 0.0));
+}
+
+TEST(Bench, WhereTheProjectorHardlyReachesOnlyTheAmbientLightIsReachable) {
+  BenchTruth truth = plain_truth();
+  truth.projector.black_fraction = 0.002;
+  for (const double ambient_nits : {0.0, 2.0}) {
+    truth.room.ambient_nits = ambient_nits;
+    const auto bench = make_bench(truth, square(0.3));
+    const Xyz ambient = bench->board({}, {0, 0}, false, true);
+    for (const double geometry : {0.0, 5e-324, 1e-300, 1e-30, 1e-12, 1e-9})  // below a rounding
+      for (const double error : {-kFloat, 0.0, kFloat}) {
+        if (ambient_nits > 0 || geometry == 0) {
+          EXPECT_TRUE(bench->reachable((1 + error) * ambient, geometry))
+              << geometry << ' ' << error;
+        }
+        EXPECT_FALSE(bench->reachable(1.01 * ambient + Xyz::Constant(0.01), geometry)) << geometry;
+        EXPECT_FALSE(bench->reachable(0.99 * ambient - Xyz::Constant(0.01), geometry)) << geometry;
+      }
+    for (const double geometry : {-1e-9, -1.0, std::nan(""), HUGE_VAL, -HUGE_VAL})
+      EXPECT_FALSE(bench->reachable(ambient, geometry)) << geometry;
+    for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL})
+      for (const double geometry : {0.0, 1e-12, 1.0})
+        EXPECT_FALSE(bench->reachable({1, bad, 1}, geometry)) << bad << ' ' << geometry;
+  }
+}
+
+TEST(Bench, FullDriveIsReachableAtAnyGeometryThoughKeptInFloats) {
+  BenchTruth truth = plain_truth();
+  truth.projector.interaction = 0.05;
+  truth.room.ambient_nits = 2;
+  const auto bench = make_bench(truth, square(0.3));
+  const Xyz ambient = bench->board({}, {0, 0}, false, true);
+  const Xyz full = bench->board(kFull, {32, 24}, true, true) - ambient;  // at G = 1
+  for (double geometry = 10; geometry > 1e-12; geometry /= 3) {
+    const Xyz sent = geometry * full + ambient;
+    EXPECT_TRUE(bench->reachable(sent.cast<float>().cast<double>(), geometry)) << geometry;
+    const bool tells = geometry * full.maxCoeff() > 0.01 * ambient.maxCoeff();
+    if (tells) {
+      EXPECT_FALSE(bench->reachable(sent + 0.05 * geometry * full, geometry)) << geometry;
+    }
+  }
+}
+
+TEST(Bench, APixelIsCoveredHoweverLittleLightItGets) {
+  BenchTruth truth = plain_truth();
+  truth.eye.vertical_fov_deg *= 1.3;  // so that the raster ends within the eye's picture
+  const auto bench = make_bench(truth, square(0.5));
+  RigidTransform far = turned(80, Eigen::Vector3d::UnitX());
+  far.translation.z() = -9;  // ten times as far and at a slant: G is 0.002
+  int on_edge_of_raster = 0;
+  for (const RigidTransform& pose : {RigidTransform{}, far}) {
+    const EyeView view = look(*bench, pose);
+    EXPECT_GT(std::ranges::count(view.coverage.pixels(), Coverage::kCovered), 50);
+    for (std::size_t pixel = 0; pixel + 1 < view.first.size(); ++pixel) {
+      int lit = 0;
+      for (std::uint32_t i = view.first[pixel]; i < view.first[pixel + 1]; ++i)
+        if (view.samples[i].raster_pixel >= 0) ++lit;
+      const auto hits = static_cast<int>(view.first[pixel + 1] - view.first[pixel]);
+      if (hits < view.rays_per_pixel) continue;
+      EXPECT_EQ(view.coverage.pixels()[pixel], lit == 0 ? Coverage::kUnlit : Coverage::kCovered)
+          << pixel;
+      if (lit > 0 && lit < hits) ++on_edge_of_raster;
+    }
+  }
+  EXPECT_GT(on_edge_of_raster, 10);
 }
 
 TEST(Bench, RefusesPosesThatMakeNoPicture) {

@@ -4,24 +4,19 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
+#include "base/statistics.h"
 #include "simulation/bench.h"
 #include "simulation/bench/state.h"
 
 namespace veneer::simulation {
 namespace {
 
-DifferenceStatistics statistics_of(std::vector<double> de00) {
-  if (de00.empty()) return {};
-  std::ranges::sort(de00);
-  const auto count = static_cast<double>(de00.size());
-  DifferenceStatistics s;
-  s.count = static_cast<std::int64_t>(de00.size());
-  s.mean = std::accumulate(de00.begin(), de00.end(), 0.0) / count;
-  s.p95 = de00[static_cast<std::size_t>(std::ceil(0.95 * count)) - 1];
-  s.max = de00.back();
-  return s;
+DifferenceStatistics statistics_of(const std::vector<double>& de00) {
+  return {static_cast<std::int64_t>(de00.size()),
+          mean(de00),
+          quantile(de00, 0.95),
+          quantile(de00, 1.0)};
 }
 
 double mean_geometry(const EyeView& view, std::size_t pixel) {
@@ -55,10 +50,22 @@ Result<Xyz> Bench::white(const RigidTransform& world_from_object) const {
 }
 
 bool Bench::reachable(const Xyz& xyz, double geometry) const {
-  if (!(geometry > 0)) return false;
+  if (!(geometry >= 0) || !xyz.allFinite()) return false;
+  constexpr double kRounding = 1e-5;  // of pictures kept in 32-bit floats, with room to spare
   const SurfaceLight& surface = state_->on_object;
+  const double tolerance = kRounding * xyz.cwiseAbs().maxCoeff();
+  // Held against the light, not the drive: where G is small, a rounding of xyz is any drive.
+  const auto sends = [&](const Eigen::Vector3d& output) {
+    const Xyz sent = geometry * (surface.primaries * output + surface.black) + surface.ambient;
+    // False for NaN, which is what `output` is where dividing by a tiny G overflows.
+    return ((sent - xyz).cwiseAbs().array() <= tolerance).all();
+  };
+  if (sends(Eigen::Vector3d::Zero())) return true;
+  if (geometry == 0) return false;
   const Xyz from_channels = (xyz - surface.ambient) / geometry - surface.black;
-  return state_->projector.drive_of(surface.primaries.inverse() * from_channels).has_value();
+  const VirtualProjector& projector = state_->projector;
+  return sends(
+      projector.interact(projector.drive_towards(surface.primaries.inverse() * from_channels)));
 }
 
 Result<Comparison> Bench::compare(const EyeView& view,
@@ -83,7 +90,7 @@ Result<Comparison> Bench::compare(const EyeView& view,
     const Coverage coverage = view.coverage.pixels()[pixel];
     if (coverage == Coverage::kPartial) ++c.partial;
     if (coverage == Coverage::kUnlit) ++c.unlit;
-    if (coverage != Coverage::kCovered) continue;
+    if (coverage != Coverage::kCovered && coverage != Coverage::kUnlit) continue;
     const Xyz wanted = target.pixels()[pixel].cast<double>();
     const Xyz got = received.pixels()[pixel].cast<double>();
     if (!wanted.allFinite() || !got.allFinite())
@@ -105,8 +112,8 @@ Result<Comparison> Bench::compare(const EyeView& view,
   if (!covered.empty())
     c.in_gamut_fraction =
         static_cast<double>(within_gamut.size()) / static_cast<double>(covered.size());
-  c.covered = statistics_of(std::move(covered));
-  c.within_gamut = statistics_of(std::move(within_gamut));
+  c.covered = statistics_of(covered);
+  c.within_gamut = statistics_of(within_gamut);
   return c;
 }
 

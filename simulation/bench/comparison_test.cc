@@ -48,8 +48,37 @@ TEST_F(ComparisonTest, EqualPicturesDoNotDiffer) {
   EXPECT_GT(c->covered.count, 500);
   EXPECT_EQ(c->covered.max, 0);
   EXPECT_GT(c->partial, 10) << "the silhouette";
-  for (std::size_t i = 0; i < picture.pixels().size(); ++i)
-    EXPECT_EQ(std::isnan(c->de00.pixels()[i]), view_.coverage.pixels()[i] != Coverage::kCovered);
+  EXPECT_GT(c->unlit, 10) << "past the terminator and the raster";
+  for (std::size_t i = 0; i < picture.pixels().size(); ++i) {
+    const Coverage coverage = view_.coverage.pixels()[i];
+    EXPECT_EQ(std::isnan(c->de00.pixels()[i]),
+              coverage == Coverage::kOutside || coverage == Coverage::kPartial);
+  }
+}
+
+TEST_F(ComparisonTest, WhatGetsNoLightCountsAndIsInGamutWhereAmbientLightSuffices) {
+  view_ = *bench_->look({}, {1, 0, 0.3});  // half round the sphere
+  const Image<Rgb32f> dark = seen(Image<Rgb16>(64, 48, {0, 0, 0}));
+  const auto good = bench_->compare(view_, dark, dark);
+  ASSERT_TRUE(good) << good.error().what;
+  EXPECT_GT(good->unlit, 100);
+  EXPECT_GT(good->covered.count, good->unlit);
+  EXPECT_EQ(good->in_gamut_fraction, 1.0);
+
+  Image<Rgb32f> lighter = dark;
+  for (Rgb32f& xyz : lighter.pixels()) xyz *= 1.5F;  // which a little of the lamp gives
+  const auto c = bench_->compare(view_, lighter, dark);
+  ASSERT_TRUE(c) << c.error().what;
+  EXPECT_EQ(c->covered.count, good->covered.count);
+  for (std::size_t i = 0; i < dark.pixels().size(); ++i) {
+    if (view_.coverage.pixels()[i] != Coverage::kUnlit) continue;
+    EXPECT_GT(c->de00.pixels()[i], 0) << i;
+    EXPECT_EQ(c->in_gamut.pixels()[i], 0) << i;
+  }
+  EXPECT_LE(c->within_gamut.count, c->covered.count - c->unlit);
+  EXPECT_GT(c->within_gamut.count, 0);
+  EXPECT_EQ(c->in_gamut_fraction,
+            static_cast<double>(c->within_gamut.count) / static_cast<double>(c->covered.count));
 }
 
 TEST_F(ComparisonTest, AMirroredFrameIsNoticed) {

@@ -119,18 +119,15 @@ Eigen::Vector3d VirtualProjector::output(const Rgb16& code) const {
   return interact({tones_[0].at(code[0]), tones_[1].at(code[1]), tones_[2].at(code[2])});
 }
 
-std::optional<Eigen::Vector3d> VirtualProjector::drive_of(const Eigen::Vector3d& output) const {
-  // Fixed point of d = output / (1 - interaction * others); with an interaction of at most 0.3 each
-  // step shrinks the error at least to a half.
-  Eigen::Vector3d drive = output;
+Eigen::Vector3d VirtualProjector::drive_towards(const Eigen::Vector3d& output) const {
+  // Fixed point of d = output / (1 - interaction * others), cut to the cube; with an interaction of
+  // at most 0.3 each step shrinks the error at least to a half, wherever it starts.
+  Eigen::Vector3d drive = Eigen::Vector3d::Zero();
   for (int step = 0; step < 40; ++step) {
     const Eigen::Vector3d others = 0.5 * (Eigen::Vector3d::Constant(drive.sum()) - drive);
-    drive = output.cwiseQuotient(Eigen::Vector3d::Ones() - truth_.interaction * others);
-    // Far off the cube the iteration may run away; what is there is out of reach anyhow.
-    if (!(drive.cwiseAbs().maxCoeff() < 2.0)) return std::nullopt;
+    drive = output.cwiseQuotient(Eigen::Vector3d::Ones() - truth_.interaction * others)
+                .unaryExpr([](double d) { return std::clamp(d, 0.0, 1.0); });
   }
-  constexpr double kRounding = 1e-5;  // of targets that come as floats
-  if (drive.minCoeff() < -kRounding || drive.maxCoeff() > 1.0 + kRounding) return std::nullopt;
   return drive;
 }
 

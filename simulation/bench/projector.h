@@ -31,8 +31,11 @@ class VirtualProjector {
 
   /// Outputs of one code triple; every code is below 2^bits.
   [[nodiscard]] Eigen::Vector3d output(const Rgb16& code) const;
-  /// The linear drive in [0,1]^3 (tone curves undone) that gives `output`; nothing where none does.
-  [[nodiscard]] std::optional<Eigen::Vector3d> drive_of(const Eigen::Vector3d& output) const;
+  /// Outputs of a linear drive in [0,1]^3 (tone curves undone).
+  [[nodiscard]] Eigen::Vector3d interact(const Eigen::Vector3d& drive) const;
+  /// The linear drive in [0,1]^3 that gives `output`; where none does, one with channels cut to
+  /// [0,1]. NaN for NaN.
+  [[nodiscard]] Eigen::Vector3d drive_towards(const Eigen::Vector3d& output) const;
   /// Outputs of a frame after the lens has blurred it; no light comes from beyond the raster.
   /// Errors: kInvalidOption (a frame of another size, a code over 2^bits - 1).
   [[nodiscard]] Result<Image<Rgb32f>> project(ImageView<const Rgb16> codes) const;
@@ -42,7 +45,6 @@ class VirtualProjector {
   [[nodiscard]] const Spectrum& black() const { return black_; }
 
  private:
-  [[nodiscard]] Eigen::Vector3d interact(const Eigen::Vector3d& drive) const;
   [[nodiscard]] double raw_vignetting(const Eigen::Vector2d& pixel) const;
 
   ProjectorTruth truth_;

@@ -62,7 +62,7 @@ TEST(VirtualProjector, LeakMovesLightBetweenSpectraAndLosesNone) {
   }
 }
 
-TEST(VirtualProjector, DriveOfUndoesTheInteraction) {
+TEST(VirtualProjector, DriveTowardsUndoesTheInteraction) {
   ProjectorTruth truth = plain_truth().projector;
   truth.bits = 10;
   truth.interaction = 0.3;
@@ -71,19 +71,25 @@ TEST(VirtualProjector, DriveOfUndoesTheInteraction) {
   for (int trial = 0; trial < 200; ++trial) {
     Rgb16 code{};
     for (auto& value : code) value = static_cast<std::uint16_t>(1024 * random.uniform());
-    const auto drive = projector.drive_of(projector.output(code));
-    ASSERT_TRUE(drive) << code[0] << ' ' << code[1] << ' ' << code[2];
+    const Eigen::Vector3d drive = projector.drive_towards(projector.output(code));
     for (int c = 0; c < 3; ++c)
-      EXPECT_NEAR((*drive)[c], code[static_cast<std::size_t>(c)] / 1023.0, 1e-9);
+      EXPECT_NEAR(drive[c], code[static_cast<std::size_t>(c)] / 1023.0, 1e-9);
+    EXPECT_TRUE(projector.interact(drive).isApprox(projector.output(code), 1e-9));
   }
 }
 
-TEST(VirtualProjector, DriveOfRefusesWhatNoDriveGives) {
-  const VirtualProjector projector(plain_truth().projector);
-  EXPECT_FALSE(projector.drive_of({1.01, 0.5, 0.5}));
-  EXPECT_FALSE(projector.drive_of({0.5, -0.01, 0.5}));
-  EXPECT_FALSE(projector.drive_of({0.5, 0.5, std::nan("")}));
-  EXPECT_FALSE(projector.drive_of({1e300, 0.5, 0.5}));
+TEST(VirtualProjector, DriveTowardsStaysWithinTheCubeAndKeepsNan) {
+  ProjectorTruth truth = plain_truth().projector;
+  truth.interaction = 0.3;
+  const VirtualProjector projector(truth);
+  for (const double far : {-1e300, -0.01, 1.01, 1e300, HUGE_VAL, -HUGE_VAL}) {
+    const Eigen::Vector3d drive = projector.drive_towards({far, 0.3, 0.3});
+    EXPECT_EQ(drive[0], far > 0 ? 1 : 0) << far;
+    const Eigen::Vector3d output = projector.interact(drive);
+    EXPECT_NEAR(output[1], 0.3, 1e-9) << far << ": the other channels are still right";
+    EXPECT_NEAR(output[2], 0.3, 1e-9) << far;
+  }
+  EXPECT_TRUE(std::isnan(projector.drive_towards({0.5, 0.5, std::nan("")})[2]));
 }
 
 TEST(VirtualProjector, PixelsFollowThePinhole) {
