@@ -14,6 +14,7 @@
 #include "base/colour.h"
 #include "base/parallel.h"
 #include "base/random.h"
+#include "base/statistics.h"
 
 namespace veneer::btf {
 namespace {
@@ -133,7 +134,7 @@ double drawn_epsilon(const SampleSet& set, const Material& material, Progress& p
       progress.advance();
     }
   });
-  return std::accumulate(means.begin(), means.end(), 0.0) / static_cast<double>(texels);
+  return mean(means);
 }
 
 }  // namespace
@@ -209,12 +210,8 @@ Result<Evaluation> evaluate(const SampleSet& set, const Material& material, Prog
   result.encoded = image_error(total.encoded, total.encoded_squares, info);
   result.psnr_db = result.encoded.rmse > 0.0 ? -20.0 * std::log10(result.encoded.rmse)
                                              : std::numeric_limits<double>::infinity();
-  result.de00_mean = std::accumulate(differences.begin(), differences.end(), 0.0) /
-                     static_cast<double>(differences.size());
-  const auto p95 = differences.begin() +
-                   static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(differences.size() - 1));
-  std::nth_element(differences.begin(), p95, differences.end());
-  result.de00_p95 = *p95;
+  result.de00_mean = mean(differences);
+  result.de00_p95 = quantile(std::move(differences), 0.95);
   result.drawn_epsilon_avg = drawn_epsilon(set, material, progress);
   const ModelShader shader = material.shader();
   result.bytes_per_texel = static_cast<double>(shader.gpu_bytes()) / static_cast<double>(texels);

@@ -43,7 +43,7 @@ Status check_range(std::string_view name, int value, int least, int most) {
 Status FitOptions::check() const {
   constexpr int kMostClusters = 256;  // a texel stores its cluster in 8 bits
   VENEER_TRY(check_range("clusters", clusters, 1, kMostClusters));
-  VENEER_TRY(check_range("angular", angular, 4, 32));
+  VENEER_TRY(check_range("angular", angular, kLeastAngular, kMostAngular));
   VENEER_TRY(check_range("basis", basis, 0, 4096));
   VENEER_TRY(check_range("iterations", iterations, 1, 10000));
   VENEER_TRY(parse_components(components));

@@ -32,9 +32,11 @@ struct FitOptions {
   /// Nodes along each side of the square that directions are mapped to, for models drawn through
   /// Schneider's elevated concentric map. 4 to 32: the volume grows with the fourth power.
   int angular = 16;
+  static constexpr int kLeastAngular = 4;
+  static constexpr int kMostAngular = 32;
   /// Columns of the randomised basis in which clusters are found; 0 fits in the full space.
   int basis = 160;
-  /// Lloyd iterations at most.
+  /// Lloyd iterations at most, from each start and after each swap of clusters.
   int iterations = 60;
   std::uint64_t seed = 1;
   /// Errors: kInvalidOption, naming the option and what it may be.
@@ -89,7 +91,8 @@ struct Model {
 /// Errors: kInvalidOption, naming the models there are.
 [[nodiscard]] Result<const Model*> find_model(std::string_view name);
 
-/// Writes a material whole or not at all. `fitted_on` and the options go into its metadata.
+/// Writes a material whole or not at all. `provenance`, such as
+/// what it was fitted on and how, goes into its metadata beside the material's own entries.
 [[nodiscard]] Status save_material(const Material& material,
                                    const std::filesystem::path& path,
                                    const std::map<std::string, std::string>& provenance);

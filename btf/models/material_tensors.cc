@@ -3,31 +3,18 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
+
+#include "btf/internal_sample_set.h"
 
 namespace veneer::btf {
 namespace {
-
-// More texels a side than GL promises to take in one texture.
-constexpr int kMostTexels = 16384;
 
 Result<DirectionSet> read_directions_of(const SafetensorsFile& file, const std::string& name) {
   VENEER_ASSIGN(const TensorView tensor, file.tensor(name, DType::kF64, {-1, 3}));
   const std::span<const double> values = tensor.as<double>();
   DirectionSet directions;
-  for (std::size_t i = 0; i + 3 <= values.size(); i += 3) {
-    const Direction direction(values[i], values[i + 1], values[i + 2]);
-    constexpr double kUnitTolerance = 1e-6;  // directions were written from unit vectors in double
-    if (!(std::abs(direction.squaredNorm() - 1.0) < kUnitTolerance))
-      return fail(Errc::kBadFormat,
-                  "reading {}: {}: direction {} is no unit vector",
-                  file.path().string(),
-                  name,
-                  i / 3);
-    directions.push_back(direction);
-  }
-  if (directions.empty())
-    return fail(Errc::kBadFormat, "reading {}: {} holds no direction", file.path().string(), name);
+  for (std::size_t i = 0; i + 3 <= values.size(); i += 3)
+    directions.emplace_back(values[i], values[i + 1], values[i + 2]);
   return directions;
 }
 
@@ -51,12 +38,30 @@ void add_frame(const MaterialFrame& frame, Material::Contents& contents) {
 }
 
 Result<MaterialFrame> read_frame(const SafetensorsFile& file) {
-  MaterialFrame frame;
-  VENEER_ASSIGN(frame.width, read_integer(file, "width", 1, kMostTexels));
-  VENEER_ASSIGN(frame.height, read_integer(file, "height", 1, kMostTexels));
-  VENEER_ASSIGN(frame.views, read_directions_of(file, "views"));
-  VENEER_ASSIGN(frame.lights, read_directions_of(file, "lights"));
-  return frame;
+  SampleSetInfo info;
+  VENEER_ASSIGN(info.width, read_integer(file, "width", 1, kMostTextureSide));
+  VENEER_ASSIGN(info.height, read_integer(file, "height", 1, kMostTextureSide));
+  VENEER_ASSIGN(info.views, read_directions_of(file, "views"));
+  VENEER_ASSIGN(info.lights, read_directions_of(file, "lights"));
+  VENEER_TRY(internal::check_info(
+      info, Errc::kBadFormat, fmt::format("reading {}", file.path().string())));
+  return frame_of(info);
+}
+
+Status check_texture(std::string_view what,
+                     std::int64_t width,
+                     std::int64_t height,
+                     Errc code,
+                     std::string_view doing) {
+  if (width <= kMostTextureSide && height <= kMostTextureSide) return {};
+  return fail(code,
+              "{}: {} would take a texture of {} x {}, over {} a side; crop the sample or choose "
+              "fewer components",
+              doing,
+              what,
+              width,
+              height,
+              kMostTextureSide);
 }
 
 Result<int> read_integer(const SafetensorsFile& file, const std::string& key, int least, int most) {

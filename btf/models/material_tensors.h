@@ -23,8 +23,18 @@ struct MaterialFrame {
 
 /// Adds the frame to a material's contents: metadata "width", "height", tensors "views", "lights".
 void add_frame(const MaterialFrame& frame, Material::Contents& contents);
-/// Reads it back. Errors: kBadFormat (missing, sizes out of range, directions that are not unit).
+/// Reads it back. Errors: kBadFormat (missing, sizes out of range, directions that no sample set
+/// may have).
 [[nodiscard]] Result<MaterialFrame> read_frame(const SafetensorsFile& file);
+
+/// Texels of a texture's side that every GL 4.5 takes.
+inline constexpr int kMostTextureSide = 16384;
+/// Refuses, with `code`, a texture that a GPU might refuse.
+[[nodiscard]] Status check_texture(std::string_view what,
+                                   std::int64_t width,
+                                   std::int64_t height,
+                                   Errc code,
+                                   std::string_view doing);
 
 /// A metadata entry that is an integer in [least, most]. Errors: kBadFormat.
 [[nodiscard]] Result<int> read_integer(const SafetensorsFile& file,

@@ -27,4 +27,5 @@ set(VENEER_MODEL_SHADERS
   models/elevated_concentric.glsl
   models/lpca/lpca.glsl
   models/packed_lpca.glsl
+  models/texel_at.glsl
   models/texel_colours/texel_colours.glsl)

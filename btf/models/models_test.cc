@@ -86,6 +86,10 @@ FitOptions options_with(std::string components, int clusters = 2) {
   return options;
 }
 
+bool has_form(const Model& model, std::string_view form) {
+  return form.empty() || model.name == "dichromatic-lpca";
+}
+
 double largest_error(const SampleSet& set, const Material& material) {
   std::vector<float> wanted(static_cast<std::size_t>(set.info().pair_count()) * 3);
   std::vector<float> got(wanted.size());
@@ -174,6 +178,43 @@ TEST(Models, DichromaticMasksTexelsWithoutDiffuseReference) {
   ASSERT_TRUE(material) << material.error().what;
   EXPECT_EQ((*material)->contents().metadata.at("masked_texels"), "1");
   EXPECT_LT(largest_error(set, **material), kHalfTolerance);
+  // The other form divides by nothing and masks none.
+  FitOptions options = options_with("1+1");
+  options.form = "subtractive";
+  const auto subtractive = fit("dichromatic-lpca", set, options);
+  ASSERT_TRUE(subtractive) << subtractive.error().what;
+  EXPECT_EQ((*subtractive)->contents().metadata.at("masked_texels"), "0");
+}
+
+TEST(Models, RefuseTexturesThatGpusMightNotTakeBeforeTheyFit) {
+  const TemporaryFolder folder;
+  SampleSetInfo wide = small_info(true);
+  wide.width = 16385;
+  wide.height = 1;
+  wide.views = {Direction::UnitZ()};
+  wide.lights = {Direction::UnitZ()};
+  const auto sample = [](int, int, int, int) { return 0.5F; };
+  const SampleSet too_wide = make_set(folder.path() / "wide.btfset", wide, sample);
+  for (const Model& model : models()) {
+    const auto refused =
+        fit(model.name, too_wide, options_with(model.name == "lpca" ? "1" : "1+1"));
+    ASSERT_FALSE(refused) << model.name;
+    EXPECT_EQ(refused.error().code, Errc::kInvalidOption) << refused.error().what;
+  }
+  // Two terms of 16 components and two colours take five words a texel.
+  wide.width = 3300;
+  const SampleSet many_words = make_set(folder.path() / "words.btfset", wide, sample);
+  EXPECT_FALSE(fit("texel-colours", many_words, options_with("16+16", 1)));
+  // A row for each component and view.
+  SampleSetInfo views = small_info(true);
+  views.width = views.height = 1;
+  views.lights = {Direction::UnitZ()};
+  views.views = ring(1100, 1.0);
+  const SampleSet many_views = make_set(folder.path() / "views.btfset", views, sample);
+  const auto rows = fit("lpca", many_views, options_with("16", 1));
+  ASSERT_FALSE(rows);
+  EXPECT_EQ(rows.error().code, Errc::kInvalidOption) << rows.error().what;
+  EXPECT_TRUE(fit("lpca", many_views, options_with("4", 1)));
 }
 
 TEST(Models, DichromaticRefusesAnUnpolarisedSetAndSaysWhatToDo) {
@@ -257,7 +298,8 @@ TEST(Models, DrawNothingFromBelowAndFiniteValuesEverywhere) {
       FitOptions options = options_with(model.name == "lpca" ? "2" : "1+1");
       options.form = form;
       const auto material = fit(model.name, set, options);
-      if (!material) continue;  // the model has no such form
+      ASSERT_EQ(material.has_value(), has_form(model, form)) << model.name << form;
+      if (!material) continue;
       for (int i = 0; i < 2000; ++i) {
         const Direction view = random_direction(random, -0.05);
         const Direction light = random_direction(random, -0.2);
@@ -331,6 +373,7 @@ TEST(Models, SavedMaterialsComeBackTheSame) {
       FitOptions options = options_with(model.name == "lpca" ? "2" : "2+1");
       options.form = form;
       const auto material = fit(model.name, set, options);
+      ASSERT_EQ(material.has_value(), has_form(model, form)) << model.name << form;
       if (!material) continue;
       const Status saved = save_material(**material, path, {{"fitted_on", "a formula"}});
       ASSERT_TRUE(saved) << saved.error().what;
@@ -439,6 +482,23 @@ TEST(LoadMaterial, RefusesDamagedFilesWithAMessage) {
       expect_refused(key, [key](auto& c) { c.metadata.erase(key); });
       expect_refused(key, [key](auto& c) { c.metadata[key] = "-7"; });
     }
+    for (const char* name : {"views", "lights"}) {
+      const auto tensor = std::ranges::find(
+          good.tensors, name, [](const auto& t) -> const std::string& { return t.spec.name; });
+      const auto index = static_cast<std::size_t>(tensor - good.tensors.begin());
+      std::vector<double> values(tensor->bytes.size() / sizeof(double));
+      std::memcpy(values.data(), tensor->bytes.data(), tensor->bytes.size());
+      const auto replace_second = [&](const Direction& direction) {
+        std::copy_n(direction.data(), 3, values.begin() + 3);
+        return [&values, index](auto& c) {
+          c.tensors[index].bytes = std::as_bytes(std::span(values));
+        };
+      };
+      expect_refused("equal directions", replace_second({values[0], values[1], values[2]}));
+      expect_refused("a direction from below", replace_second({0.6, 0.0, -0.8}));
+    }
+    if (good.metadata.contains("angular"))
+      expect_refused("too many nodes", [](auto& c) { c.metadata["angular"] = "64"; });
     expect_refused("a newer version", [](auto& c) { c.metadata["version"] = "2"; });
     for (std::size_t i = 0; i < good.tensors.size(); ++i) {
       const TensorSpec& spec = good.tensors[i].spec;

@@ -20,12 +20,23 @@ constexpr int kLanesPerWord = 8;
 constexpr char kElevatedConcentricGlsl[] =
 #include "btf/models/elevated_concentric.glsl.inc"
     ;
+constexpr char kTexelAtGlsl[] =
+#include "btf/models/texel_at.glsl.inc"
+    ;
 constexpr char kPackedLpcaGlsl[] =
 #include "btf/models/packed_lpca.glsl.inc"
     ;
 
 int volumes_for(const PackedLpca::Components& components) {
   return (components[0] + components[1] + kScalarsPerVolume - 1) / kScalarsPerVolume;
+}
+
+// The lane of a texel's cluster: the last, behind weights and colours.
+int cluster_lane_of(const PackedLpca::Layout& layout) {
+  return volumes_for(layout.components) * kScalarsPerVolume + 3 * layout.colours;
+}
+int words_for(const PackedLpca::Layout& layout) {
+  return cluster_lane_of(layout) / kLanesPerWord + 1;
 }
 
 // As the constructor will lay them out, without the padding of clusters to whole rows.
@@ -47,18 +58,32 @@ std::string lane(int index) {
 
 }  // namespace
 
+Status PackedLpca::check(const MaterialFrame& frame,
+                         const Layout& layout,
+                         int clusters,
+                         Errc code,
+                         std::string_view doing) {
+  VENEER_TRY(check_texture("the texels",
+                           static_cast<std::int64_t>(frame.width) * words_for(layout),
+                           frame.height,
+                           code,
+                           doing));
+  const double bytes = volume_bytes(frame, layout, std::min(clusters, frame.texel_count()));
+  if (bytes <= double(kMostVolumeBytes)) return {};
+  return fail(code,
+              "{}: the volumes would take {:.1f} GiB on the GPU, over {:.0f} GiB; choose fewer "
+              "clusters, fewer components or a smaller angular",
+              doing,
+              bytes / (1U << 30U),
+              double(kMostVolumeBytes) / (1U << 30U));
+}
+
 Result<PackedLpca> PackedLpca::fit(const MaterialFrame& frame,
                                    const FitOptions& options,
                                    const Layout& layout,
                                    const Read& read,
                                    Progress& progress) {
-  const double bytes = volume_bytes(frame, layout, std::min(options.clusters, frame.texel_count()));
-  if (bytes > double(kMostVolumeBytes))
-    return fail(Errc::kInvalidOption,
-                "fit: the volumes would take {:.1f} GiB on the GPU, over {:.0f} GiB; choose fewer "
-                "clusters, fewer components or a smaller angular",
-                bytes / (1U << 30U),
-                double(kMostVolumeBytes) / (1U << 30U));
+  VENEER_TRY(check(frame, layout, options.clusters, Errc::kInvalidOption, "fit"));
   const int pairs = frame.pair_count();
   RowSource source;
   source.rows = frame.texel_count();
@@ -123,23 +148,27 @@ void PackedLpca::fill_volumes() {
   });
 }
 
-Result<PackedLpca> PackedLpca::load(const SafetensorsFile& file, DirectionRole beyond) {
+Result<PackedLpca> PackedLpca::load(const SafetensorsFile& file,
+                                    DirectionRole beyond,
+                                    int colours) {
   VENEER_ASSIGN(MaterialFrame frame, read_frame(file));
   VENEER_ASSIGN(const std::string text, file.meta("components"));
   const auto components = parse_two_terms(text, "a model of two terms");
   if (!components)
     return fail(Errc::kBadFormat, "reading {}: {}", file.path().string(), components.error().what);
-  Layout layout{*components, 0, beyond};
-  VENEER_ASSIGN(layout.angular, read_integer(file, "angular", 2, 64));
+  Layout layout{*components, 0, beyond, colours};
+  VENEER_ASSIGN(layout.angular,
+                read_integer(file, "angular", FitOptions::kLeastAngular, FitOptions::kMostAngular));
   VENEER_ASSIGN(LpcaFactors factors,
                 read_factors(file,
                              frame.texel_count(),
                              layout.components[0] + layout.components[1],
                              frame.pair_count()));
-  if (volume_bytes(frame, layout, factors.clusters) > double(kMostVolumeBytes))
-    return fail(Errc::kBadFormat,
-                "reading {}: its volumes would be too large for a GPU",
-                file.path().string());
+  VENEER_TRY(check(frame,
+                   layout,
+                   factors.clusters,
+                   Errc::kBadFormat,
+                   fmt::format("reading {}", file.path().string())));
   return PackedLpca(std::move(frame), layout, std::move(factors));
 }
 
@@ -187,7 +216,8 @@ Eigen::Vector2d PackedLpca::evaluate(int texel,
   return scalars;
 }
 
-ModelTexture PackedLpca::pack_texels(const Colours& colours, int words) const {
+ModelTexture PackedLpca::pack_texels(std::span<const Eigen::half> colours) const {
+  const int words = words_for(layout_);
   ModelTexture texture{.sampler = "PackedTexels",
                        .kind = TextureKind::k2D,
                        .format = TexelFormat::kRgba32ui,
@@ -203,8 +233,8 @@ ModelTexture PackedLpca::pack_texels(const Colours& colours, int words) const {
         static_cast<std::size_t>(texel) * static_cast<std::size_t>(per_texel),
         static_cast<std::size_t>(per_texel));
     std::ranges::transform(factors_.weights_of(texel), out.begin(), bits);
-    const auto count = static_cast<std::size_t>(3 * colours.count);
-    std::ranges::transform(colours.values.subspan(static_cast<std::size_t>(texel) * count, count),
+    const auto count = static_cast<std::size_t>(3 * layout_.colours);
+    std::ranges::transform(colours.subspan(static_cast<std::size_t>(texel) * count, count),
                            out.begin() + first_colour,
                            bits);
     out[static_cast<std::size_t>(first_colour) + count] =
@@ -214,10 +244,10 @@ ModelTexture PackedLpca::pack_texels(const Colours& colours, int words) const {
   return texture;
 }
 
-ModelShader PackedLpca::shader(const Colours& colours) const {
+ModelShader PackedLpca::shader(std::span<const Eigen::half> colours) const {
   const int first_colour = volume_count() * kScalarsPerVolume;
-  const int cluster_lane = first_colour + 3 * colours.count;
-  const int words = cluster_lane / kLanesPerWord + 1;
+  const int cluster_lane = cluster_lane_of(layout_);
+  const int words = words_for(layout_);
   const int a = views_.nodes();
   const int b = lights_.nodes();
 
@@ -240,13 +270,14 @@ ModelShader PackedLpca::shader(const Colours& colours) const {
   for (int v = 0; v < volume_count(); ++v)
     source += fmt::format("uniform sampler3D Volume{};\n", v);
   source += kElevatedConcentricGlsl;
+  source += kTexelAtGlsl;
   source += kPackedLpcaGlsl;
 
   source += fmt::format(
       "void packed_evaluate(vec2 uv, vec3 view, vec3 light, out vec2 scalars, out vec3 "
       "colours[{}]) {{\n"
-      "  ivec2 texel = packed_texel(uv);\n",
-      colours.count);
+      "  ivec2 texel = texel_at(uv);\n",
+      layout_.colours);
   for (int w = 0; w < words; ++w)
     source += fmt::format(
         "  uvec4 word{0} = texelFetch(PackedTexels, ivec2(texel.x * {1} + {0}, texel.y), 0);\n",
@@ -268,7 +299,7 @@ ModelShader PackedLpca::shader(const Colours& colours) const {
                             "xyzw"[c]);
     }
   }
-  for (int c = 0; c < colours.count; ++c)
+  for (int c = 0; c < layout_.colours; ++c)
     source += fmt::format("  colours[{}] = vec3({}, {}, {});\n",
                           c,
                           lane(first_colour + 3 * c),
@@ -278,7 +309,7 @@ ModelShader PackedLpca::shader(const Colours& colours) const {
 
   ModelShader shader;
   shader.source = std::move(source);
-  shader.textures.push_back(pack_texels(colours, words));
+  shader.textures.push_back(pack_texels(colours));
   for (int v = 0; v < volume_count(); ++v) {
     ModelTexture volume{.sampler = fmt::format("Volume{}", v),
                         .kind = TextureKind::k3D,

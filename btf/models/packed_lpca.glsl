@@ -1,10 +1,6 @@
 // Scalar Eigen-BRDFs packed four to an RGBA volume (packed_lpca.h). Before this stand the constants
 // and samplers of one material, behind it packed_evaluate().
 
-ivec2 packed_texel(vec2 uv) {
-  return min(ivec2(fract(uv) * vec2(kTexels)), kTexels - 1);
-}
-
 // Where the volumes are read: the lower of two neighbouring rows of light nodes, and how far the
 // light is towards the upper.
 struct PackedPlace {

@@ -28,16 +28,26 @@ class PackedLpca {
     Components components{};
     int angular = 16;
     DirectionRole beyond = DirectionRole::kLight;
+    int colours = 1;  ///< of a texel, 1 or 2
   };
 
-  /// Errors: kInvalidOption where the volumes would be larger than kMostVolumeBytes.
+  /// Refuses, with `code`, volumes over kMostVolumeBytes and textures larger than GPUs take. fit()
+  /// and load() ask it too; models that look at all samples first ask it before.
+  [[nodiscard]] static Status check(const MaterialFrame& frame,
+                                    const Layout& layout,
+                                    int clusters,
+                                    Errc code,
+                                    std::string_view doing);
+  /// Errors: kInvalidOption, of check().
   [[nodiscard]] static Result<PackedLpca> fit(const MaterialFrame& frame,
                                               const FitOptions& options,
                                               const Layout& layout,
                                               const Read& read,
                                               Progress& progress);
-  /// Reads what add_to() wrote. Errors: kBadFormat.
-  [[nodiscard]] static Result<PackedLpca> load(const SafetensorsFile& file, DirectionRole beyond);
+  /// Reads what add_to() wrote, within the limits of fit(). Errors: kBadFormat.
+  [[nodiscard]] static Result<PackedLpca> load(const SafetensorsFile& file,
+                                               DirectionRole beyond,
+                                               int colours);
   void add_to(Material::Contents& contents) const;
 
   [[nodiscard]] const MaterialFrame& frame() const { return frame_; }
@@ -50,22 +60,18 @@ class PackedLpca {
                                          const Direction& view,
                                          const Direction& light) const;
 
-  /// Texels' colours as float16, three for each colour: [texel][colour][3].
-  struct Colours {
-    int count = 0;  ///< colours of a texel, 1 or 2
-    std::span<const Eigen::half> values;
-  };
-  /// GLSL constants and the function
+  /// @param colours  of texels, three for each colour: [texel][colour][3].
+  /// @return GLSL constants and the function
   /// `void packed_evaluate(vec2 uv, vec3 view, vec3 light, out vec2 scalars, out vec3
   /// colours[count])`, its textures and fetches.
-  [[nodiscard]] ModelShader shader(const Colours& colours) const;
+  [[nodiscard]] ModelShader shader(std::span<const Eigen::half> colours) const;
 
   static constexpr std::size_t kMostVolumeBytes = std::size_t{2} << 30U;
 
  private:
   PackedLpca(MaterialFrame frame, Layout layout, LpcaFactors factors);
   [[nodiscard]] int volume_count() const;
-  [[nodiscard]] ModelTexture pack_texels(const Colours& colours, int words) const;
+  [[nodiscard]] ModelTexture pack_texels(std::span<const Eigen::half> colours) const;
   void fill_volumes();
 
   MaterialFrame frame_;

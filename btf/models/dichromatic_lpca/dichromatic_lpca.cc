@@ -16,6 +16,7 @@ namespace {
 constexpr std::string_view kName = "dichromatic-lpca";
 constexpr std::string_view kRatio = "ratio";
 constexpr std::string_view kSubtractive = "subtractive";
+constexpr int kColours = 1;  // of a texel in the shader
 
 // |D_ref| under this is noise: a thousandth of a white diffuser, the black noise of 12-bit capture.
 constexpr float kNoise = 1e-3F;
@@ -35,7 +36,7 @@ struct Terms {
   Eigen::Vector3f specular_colour = Eigen::Vector3f::UnitX();
   Eigen::Vector3f shade_colour =
       Eigen::Vector3f::UnitX();  // of what shadows take away; subtractive
-  int masked_texels = 0;
+  int masked_texels = 0;         // without body colour; ratio
 };
 
 bool lower(const Direction& a, const Direction& b) { return a.z() < b.z(); }
@@ -99,7 +100,7 @@ class Dichromatic final : public Material {
   }
 
   ModelShader shader() const override {
-    ModelShader shader = scalars_.shader({1, colours_});
+    ModelShader shader = scalars_.shader(colours_);
     const auto vec3 = [](const Eigen::Vector3f& v) {
       return fmt::format("vec3({:.9g}, {:.9g}, {:.9g})", v[0], v[1], v[2]);
     };
@@ -144,8 +145,8 @@ class Dichromatic final : public Material {
   double border_cosine_ = 0.0;        // of the lowest light
 };
 
-DirectionRole beyond(const Terms& terms) {
-  return terms.subtractive ? DirectionRole::kView : DirectionRole::kLight;
+DirectionRole beyond(bool subtractive) {
+  return subtractive ? DirectionRole::kView : DirectionRole::kLight;
 }
 
 // Looks at all samples once: the reference, the colours and how many texels are masked.
@@ -185,7 +186,7 @@ Terms find_terms(const SampleSet& set,
   for (int i = 0; i < info.texel_count(); ++i) {
     specular_sum += specular[static_cast<std::size_t>(i)];
     shade_sum += shade[static_cast<std::size_t>(i)];
-    if (colour_at(reference, i).norm() < kNoise) ++terms.masked_texels;
+    if (!subtractive && colour_at(reference, i).norm() < kNoise) ++terms.masked_texels;
   }
   terms.specular_colour = best_colour(specular_sum);
   terms.shade_colour = best_colour(shade_sum);
@@ -217,11 +218,17 @@ Result<std::unique_ptr<Material>> fit_dichromatic_lpca(const SampleSet& set,
         "capture the sample with polarisers",
         set.path().string(),
         kName);
+  const bool subtractive = options.form == kSubtractive;
+  const MaterialFrame frame = frame_of(set.info());
+  const PackedLpca::Layout layout{.components = components,
+                                  .angular = options.angular,
+                                  .beyond = beyond(subtractive),
+                                  .colours = kColours};
+  VENEER_TRY(PackedLpca::check(frame, layout, options.clusters, Errc::kInvalidOption, "fit"));
   VENEER_TRY(set.check_finite());
 
   std::vector<Eigen::half> reference;
-  const Terms terms = find_terms(set, options.form == kSubtractive, reference, progress);
-  const MaterialFrame frame = frame_of(set.info());
+  const Terms terms = find_terms(set, subtractive, reference, progress);
   const auto read = [&](int texel, std::span<float> shading, std::span<float> specular) {
     std::vector<float> rgb(3 * shading.size());
     const Samples samples(rgb.data(), frame.pair_count(), 3);
@@ -235,13 +242,7 @@ Result<std::unique_ptr<Material>> fit_dichromatic_lpca(const SampleSet& set,
     set.rgb(texel, Part::kSpecular, rgb);
     Eigen::Map<Eigen::VectorXf>(specular.data(), samples.rows()) = samples * terms.specular_colour;
   };
-  VENEER_ASSIGN(PackedLpca scalars,
-                PackedLpca::fit(
-                    frame,
-                    options,
-                    {.components = components, .angular = options.angular, .beyond = beyond(terms)},
-                    read,
-                    progress));
+  VENEER_ASSIGN(PackedLpca scalars, PackedLpca::fit(frame, options, layout, read, progress));
   return std::make_unique<Dichromatic>(std::move(scalars), terms, std::move(reference));
 }
 
@@ -256,7 +257,7 @@ Result<std::unique_ptr<Material>> load_dichromatic_lpca(const SafetensorsFile& f
                 kRatio,
                 kSubtractive);
   terms.subtractive = form == kSubtractive;
-  VENEER_ASSIGN(PackedLpca scalars, PackedLpca::load(file, beyond(terms)));
+  VENEER_ASSIGN(PackedLpca scalars, PackedLpca::load(file, beyond(terms.subtractive), kColours));
   const int texels = scalars.frame().texel_count();
   VENEER_ASSIGN(terms.masked_texels, read_integer(file, "masked_texels", 0, texels));
   for (const auto& [name, colour] : {std::pair{"specular_colour", &terms.specular_colour},

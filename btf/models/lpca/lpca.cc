@@ -19,9 +19,24 @@ constexpr char kElevatedConcentricGlsl[] =
 constexpr char kDirectionLookupGlsl[] =
 #include "btf/models/direction_lookup.glsl.inc"
     ;
+constexpr char kTexelAtGlsl[] =
+#include "btf/models/texel_at.glsl.inc"
+    ;
 constexpr char kGlsl[] =
 #include "btf/models/lpca/lpca.glsl.inc"
     ;
+
+Status check_textures(const MaterialFrame& frame,
+                      int components,
+                      Errc code,
+                      std::string_view doing) {
+  VENEER_TRY(check_texture("the texels", frame.width, frame.height, code, doing));
+  return check_texture("the Eigen-BRDFs",
+                       static_cast<std::int64_t>(frame.lights.size()),
+                       static_cast<std::int64_t>(frame.views.size()) * components,
+                       code,
+                       doing);
+}
 
 class Lpca final : public Material {
  public:
@@ -93,6 +108,7 @@ ModelShader Lpca::shader() const {
       frame_.views.size());
   shader.source += kElevatedConcentricGlsl;
   shader.source += kDirectionLookupGlsl;
+  shader.source += kTexelAtGlsl;
   shader.source += kGlsl;
 
   ModelTexture clusters{.sampler = "Clusters",
@@ -108,13 +124,16 @@ ModelShader Lpca::shader() const {
                        .width = frame_.width,
                        .height = frame_.height,
                        .depth = layers};
-  std::vector<Eigen::half> padded(
-      static_cast<std::size_t>(frame_.texel_count() * layers * kWeightsPerTexel));
+  std::vector<Eigen::half> padded(static_cast<std::size_t>(frame_.texel_count()) *
+                                  static_cast<std::size_t>(layers * kWeightsPerTexel));
   for (int texel = 0; texel < frame_.texel_count(); ++texel)
     for (int c = 0; c < components; ++c)
-      padded[static_cast<std::size_t>(
-          ((c / kWeightsPerTexel) * frame_.texel_count() + texel) * kWeightsPerTexel +
-          c % kWeightsPerTexel)] = factors_.weights_of(texel)[static_cast<std::size_t>(c)];
+      padded[(static_cast<std::size_t>(c / kWeightsPerTexel) *
+                  static_cast<std::size_t>(frame_.texel_count()) +
+              static_cast<std::size_t>(texel)) *
+                 kWeightsPerTexel +
+             static_cast<std::size_t>(c % kWeightsPerTexel)] =
+          factors_.weights_of(texel)[static_cast<std::size_t>(c)];
   weights.data = texture_data(padded);
   shader.textures.push_back(std::move(weights));
 
@@ -151,8 +170,9 @@ Result<std::unique_ptr<Material>> fit_lpca(const SampleSet& set,
   VENEER_TRY(options.check());
   VENEER_TRY(refuse_form(options, kName));
   VENEER_ASSIGN(const int components, parse_one_term(options.components, kName));
-  VENEER_TRY(set.check_finite());
   MaterialFrame frame = frame_of(set.info());
+  VENEER_TRY(check_textures(frame, components, Errc::kInvalidOption, "fit"));
+  VENEER_TRY(set.check_finite());
   RowSource source;
   source.rows = frame.texel_count();
   source.part_columns = {frame.pair_count() * 3};
@@ -164,6 +184,8 @@ Result<std::unique_ptr<Material>> fit_lpca(const SampleSet& set,
 Result<std::unique_ptr<Material>> load_lpca(const SafetensorsFile& file) {
   VENEER_ASSIGN(MaterialFrame frame, read_frame(file));
   VENEER_ASSIGN(const int components, read_integer(file, "components", 1, kMostComponents));
+  VENEER_TRY(check_textures(
+      frame, components, Errc::kBadFormat, fmt::format("reading {}", file.path().string())));
   VENEER_ASSIGN(LpcaFactors factors,
                 read_factors(file, frame.texel_count(), components, 3 * frame.pair_count()));
   return std::make_unique<Lpca>(std::move(frame), std::move(factors));

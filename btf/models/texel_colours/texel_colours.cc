@@ -73,7 +73,7 @@ class TexelColours final : public Material {
   }
 
   ModelShader shader() const override {
-    ModelShader shader = scalars_.shader({kColours, colours_});
+    ModelShader shader = scalars_.shader(colours_);
     shader.source += kGlsl;
     return shader;
   }
@@ -104,8 +104,11 @@ Result<std::unique_ptr<Material>> fit_texel_colours(const SampleSet& set,
   VENEER_TRY(refuse_form(options, kName));
   VENEER_ASSIGN(const PackedLpca::Components components,
                 parse_two_terms(options.components, kName));
-  VENEER_TRY(set.check_finite());
   const MaterialFrame frame = frame_of(set.info());
+  const PackedLpca::Layout layout{
+      .components = components, .angular = options.angular, .colours = kColours};
+  VENEER_TRY(PackedLpca::check(frame, layout, options.clusters, Errc::kInvalidOption, "fit"));
+  VENEER_TRY(set.check_finite());
   const auto values = static_cast<std::size_t>(frame.pair_count()) * 3;
 
   progress.start("colours", frame.texel_count());
@@ -130,15 +133,12 @@ Result<std::unique_ptr<Material>> fit_texel_colours(const SampleSet& set,
     Eigen::Map<Eigen::VectorXf>(first.data(), samples.rows()) = samples * basis.row(0).transpose();
     Eigen::Map<Eigen::VectorXf>(second.data(), samples.rows()) = samples * basis.row(1).transpose();
   };
-  VENEER_ASSIGN(
-      PackedLpca scalars,
-      PackedLpca::fit(
-          frame, options, {.components = components, .angular = options.angular}, read, progress));
+  VENEER_ASSIGN(PackedLpca scalars, PackedLpca::fit(frame, options, layout, read, progress));
   return std::make_unique<TexelColours>(std::move(scalars), std::move(colours));
 }
 
 Result<std::unique_ptr<Material>> load_texel_colours(const SafetensorsFile& file) {
-  VENEER_ASSIGN(PackedLpca scalars, PackedLpca::load(file, DirectionRole::kLight));
+  VENEER_ASSIGN(PackedLpca scalars, PackedLpca::load(file, DirectionRole::kLight, kColours));
   VENEER_ASSIGN(std::vector<Eigen::half> colours,
                 read_halves(file, "colours", {scalars.frame().texel_count(), kColours, 3}));
   return std::make_unique<TexelColours>(std::move(scalars), std::move(colours));
