@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "base/random.h"
+#include "base/statistics.h"
 #include "calibration/radiometry.h"
 
 namespace veneer::calibration {
@@ -54,12 +54,9 @@ Result<ProfileVerification> verify_profile(Colorimeter& colorimeter,
     progress.advance();
   }
 
-  std::vector<double> sorted = verification.de00;
-  std::ranges::sort(sorted);
-  const auto count = static_cast<double>(sorted.size());
-  verification.de00_mean = std::accumulate(sorted.begin(), sorted.end(), 0.0) / count;
-  verification.de00_p95 = sorted[static_cast<std::size_t>(std::ceil(0.95 * count)) - 1];
-  verification.de00_max = sorted.back();
+  verification.de00_mean = mean(verification.de00);
+  verification.de00_p95 = quantile(verification.de00, 0.95);
+  verification.de00_max = quantile(verification.de00, 1.0);
   progress.finish(fmt::format("dE00 mean {:.2f}", verification.de00_mean));
   return verification;
 }
