@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -20,13 +21,44 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::string_view kFormat = "veneer-projector-profile";
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;  // 2 added the surface's map
 constexpr const char* kVignettingFile = "vignetting.exr";
+constexpr const char* kSurfaceMapFile = "surface_map.exr";
 constexpr std::array<std::string_view, 3> kChannelNames{"red", "green", "blue"};
 
 /// A matrix whose columns span less than this part of the box of their lengths counts as singular:
 /// real primaries and surfaces stay above 1e-2.
 constexpr double kLeastVolume = 1e-6;
+
+double to_double(float value) { return value; }
+Eigen::Vector3d to_double(const Rgb32f& value) { return value.cast<double>(); }
+
+/// `map`, not empty, stretched over the raster, at `pixel`.
+template <class Texel>
+auto sample(const Image<Texel>& map,
+            const ProjectorGeometry& geometry,
+            const Eigen::Vector2d& pixel) {
+  const double x =
+      std::clamp(pixel.x() * map.width() / geometry.width - 0.5, 0.0, map.width() - 1.0);
+  const double y =
+      std::clamp(pixel.y() * map.height() / geometry.height - 0.5, 0.0, map.height() - 1.0);
+  const int x0 = static_cast<int>(x);
+  const int y0 = static_cast<int>(y);
+  const int x1 = std::min(x0 + 1, map.width() - 1);
+  const int y1 = std::min(y0 + 1, map.height() - 1);
+  using Value = decltype(to_double(map(0, 0)));
+  const auto between = [](const Value& a, const Value& b, double part) {
+    return Value((1.0 - part) * a + part * b);
+  };
+  const Value upper = between(to_double(map(x0, y0)), to_double(map(x1, y0)), x - x0);
+  const Value lower = between(to_double(map(x0, y1)), to_double(map(x1, y1)), x - x0);
+  return between(upper, lower, y - y0);
+}
+
+bool is_reflectance(const Rgb32f& s) {
+  return s.allFinite() && s.minCoeff() >= kLeastReflectance &&
+         s.maxCoeff() <= 1.0F / kLeastReflectance;
+}
 
 bool invertible(const Eigen::Matrix3d& m) {
   const double box = m.col(0).norm() * m.col(1).norm() * m.col(2).norm();
@@ -114,6 +146,7 @@ Json contents_of(const ProjectorProfile& p) {
   json["black_xyz"] = to_json(p.black);
   json["reference_distance_m"] = p.reference_distance_m;
   json["surface_xyz"] = to_json(p.surface);
+  json["has_surface_map"] = !p.surface_map.empty();
   json["ambient_xyz"] = to_json(p.ambient);
   return json;
 }
@@ -143,8 +176,9 @@ ProjectorProfile profile_from(const Json& json) {
 
 /// What is in profile.json, once its version and its own checksum have been found right.
 struct Manifest {
-  ProjectorProfile profile;  // without the vignetting
+  ProjectorProfile profile;  // without the maps
   std::string vignetting_checksum;
+  std::optional<std::string> surface_map_checksum;  // none: the surface has no map
 };
 
 Result<Manifest> parse_manifest(const std::string& text) {
@@ -165,31 +199,53 @@ Result<Manifest> parse_manifest(const std::string& text) {
     if (json.at("checksum").get<std::string>() != checksum(json.at("profile").dump()))
       return fail(Errc::kBadFormat,
                   "profile.json was changed or damaged (its checksum differs); calibrate again");
-    return Manifest{profile_from(json.at("profile")),
-                    json.at("files").at(kVignettingFile).get<std::string>()};
+    const Json& files = json.at("files");
+    Manifest manifest{
+        profile_from(json.at("profile")), files.at(kVignettingFile).get<std::string>(), {}};
+    if (json.at("profile").value("has_surface_map", false))
+      manifest.surface_map_checksum = files.at(kSurfaceMapFile).get<std::string>();
+    return manifest;
   } catch (const Json::exception& e) {
     return fail(Errc::kBadFormat, "profile.json: {}; calibrate again", e.what());
   }
 }
 
+Status verify_file(const std::filesystem::path& path, const std::string& expected_checksum) {
+  VENEER_ASSIGN(const std::string bytes, read_text(path));
+  if (checksum(bytes) != expected_checksum)
+    return fail(Errc::kBadFormat,
+                "{} was changed or damaged (its checksum differs); calibrate again",
+                path.filename().string());
+  return {};
+}
+
 Result<ProjectorProfile> load_from(const std::filesystem::path& folder) {
   VENEER_ASSIGN(const std::string text, read_text(folder / "profile.json"));
   VENEER_ASSIGN(Manifest manifest, parse_manifest(text));
-  VENEER_ASSIGN(const std::string picture, read_text(folder / kVignettingFile));
-  if (checksum(picture) != manifest.vignetting_checksum)
-    return fail(Errc::kBadFormat,
-                "{} was changed or damaged (its checksum differs); calibrate again",
-                kVignettingFile);
+  VENEER_TRY(verify_file(folder / kVignettingFile, manifest.vignetting_checksum));
   VENEER_ASSIGN(std::vector<ExrChannel> channels, read_exr(folder / kVignettingFile));
   if (channels.size() != 1)
     return fail(
         Errc::kBadFormat, "{} has {} channels instead of 1", kVignettingFile, channels.size());
   manifest.profile.vignetting = std::move(channels.front().pixels);
+  if (manifest.surface_map_checksum) {
+    VENEER_TRY(verify_file(folder / kSurfaceMapFile, *manifest.surface_map_checksum));
+    VENEER_ASSIGN(manifest.profile.surface_map, read_exr_rgb(folder / kSurfaceMapFile));
+  }
   VENEER_TRY(manifest.profile.check());
   return std::move(manifest.profile);
 }
 
 }  // namespace
+
+double ProjectorProfile::vignetting_at(const Eigen::Vector2d& pixel) const {
+  return vignetting.empty() ? 1.0 : sample(vignetting, geometry, pixel);
+}
+
+Eigen::Vector3d ProjectorProfile::reflectance_at(const Eigen::Vector2d& pixel) const {
+  if (surface_map.empty()) return Eigen::Vector3d::Ones();
+  return sample(surface_map, geometry, pixel);
+}
 
 Status ProjectorProfile::check() const {
   VENEER_TRY(check_geometry(geometry));
@@ -209,6 +265,11 @@ Status ProjectorProfile::check() const {
   if (vignetting.empty()) return fail(Errc::kBadFormat, "the vignetting has no pixels");
   if (!std::ranges::all_of(vignetting.pixels(), [](float v) { return std::isfinite(v) && v > 0; }))
     return fail(Errc::kBadFormat, "the vignetting is not finite and positive everywhere");
+  if (!std::ranges::all_of(surface_map.pixels(), is_reflectance))
+    return fail(Errc::kBadFormat,
+                "the surface's map is not finite, or not between {} and {}, somewhere",
+                kLeastReflectance,
+                1.0F / kLeastReflectance);
   return {};
 }
 
@@ -217,13 +278,20 @@ Status ProjectorProfile::save(const std::filesystem::path& folder) const {
   if (const Status valid = check(); !valid) return fail_while(doing, valid.error());
   VENEER_ASSIGN(StagedFolder staged, StagedFolder::create(folder));
   VENEER_TRY(write_exr(staged.path() / kVignettingFile, {{"Y", vignetting}}));
-  VENEER_ASSIGN(const std::string picture, read_text(staged.path() / kVignettingFile));
+  std::vector<const char*> maps{kVignettingFile};
+  if (!surface_map.empty()) {
+    VENEER_TRY(write_exr(staged.path() / kSurfaceMapFile, surface_map.view()));
+    maps.push_back(kSurfaceMapFile);
+  }
   Json json;
   json["format"] = kFormat;
   json["version"] = kVersion;
   json["profile"] = contents_of(*this);
   json["checksum"] = checksum(json["profile"].dump());
-  json["files"][kVignettingFile] = checksum(picture);
+  for (const char* map : maps) {
+    VENEER_ASSIGN(const std::string bytes, read_text(staged.path() / map));
+    json["files"][map] = checksum(bytes);
+  }
   VENEER_TRY(write_text(staged.path() / "profile.json", json.dump(1) + "\n"));
   return staged.commit();
 }

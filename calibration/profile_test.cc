@@ -40,6 +40,13 @@ ProjectorProfile example_profile() {
   return p;
 }
 
+ProjectorProfile example_with_map() {
+  ProjectorProfile p = example_profile();
+  p.surface_map = Image<Rgb32f>(2, 3, Rgb32f(1.0F, 0.9F, 1.1F));
+  p.surface_map(1, 2) = Rgb32f(1.0F / 3.0F, 0.02F, 2.5F);
+  return p;
+}
+
 class ProfileTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -96,6 +103,47 @@ TEST_F(ProfileTest, ComesBackBitForBit) {
     for (int x = 0; x < 3; ++x) EXPECT_EQ(loaded->vignetting(x, y), saved.vignetting(x, y));
 }
 
+TEST_F(ProfileTest, TheSurfaceMapComesBackBitForBit) {
+  const ProjectorProfile saved = example_with_map();
+  ASSERT_TRUE(saved.save(folder_));
+  const auto loaded = ProjectorProfile::load(folder_);
+  ASSERT_TRUE(loaded) << loaded.error().what;
+  ASSERT_EQ(loaded->surface_map.width(), 2);
+  ASSERT_EQ(loaded->surface_map.height(), 3);
+  for (int y = 0; y < 3; ++y)
+    for (int x = 0; x < 2; ++x) EXPECT_EQ(loaded->surface_map(x, y), saved.surface_map(x, y));
+}
+
+TEST_F(ProfileTest, AnEmptySurfaceMapStaysEmpty) {
+  ASSERT_TRUE(example_with_map().save(folder_));
+  ASSERT_TRUE(example_profile().save(folder_));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "surface_map.exr"));
+  const auto loaded = ProjectorProfile::load(folder_);
+  ASSERT_TRUE(loaded) << loaded.error().what;
+  EXPECT_TRUE(loaded->surface_map.empty());
+}
+
+TEST_F(ProfileTest, ADamagedSurfaceMapIsRefused) {
+  ASSERT_TRUE(example_with_map().save(folder_));
+  auto picture = read_text(folder_ / "surface_map.exr");
+  ASSERT_TRUE(picture);
+  picture->back() ^= 1;
+  ASSERT_TRUE(write_text(folder_ / "surface_map.exr", *picture));
+  expect_refused("surface_map.exr was changed or damaged");
+}
+
+TEST_F(ProfileTest, AMissingSurfaceMapIsNotFound) {
+  ASSERT_TRUE(example_with_map().save(folder_));
+  std::filesystem::remove(folder_ / "surface_map.exr");
+  expect_refused("surface_map.exr", Errc::kNotFound);
+}
+
+TEST_F(ProfileTest, ASurfaceMapThatIsNoLongerListedIsRefused) {
+  ASSERT_TRUE(example_with_map().save(folder_));
+  edit_json([](nlohmann::json& json) { json["files"].erase("surface_map.exr"); });
+  expect_refused("surface_map.exr");
+}
+
 TEST_F(ProfileTest, IsReplacedWhole) {
   ASSERT_TRUE(example_profile().save(folder_));
   ProjectorProfile newer = example_profile();
@@ -135,7 +183,7 @@ TEST_F(ProfileTest, AnotherFormatIsRefused) {
 TEST_F(ProfileTest, ANewerVersionIsRefusedAsNewer) {
   ASSERT_TRUE(example_profile().save(folder_));
   edit_json([](nlohmann::json& json) {
-    json["version"] = 2;
+    json["version"] = 3;
     json["profile"]["something_new"] =
         1;  // so the checksum differs too, but that is not the reason
   });
@@ -168,7 +216,42 @@ struct Mistake {
   std::function<void(ProjectorProfile&)> make;
 };
 
-TEST(ProfileCheck, AcceptsTheExample) { EXPECT_TRUE(example_profile().check()); }
+TEST(ProfileCheck, AcceptsTheExamples) {
+  EXPECT_TRUE(example_profile().check());
+  EXPECT_TRUE(example_with_map().check());
+}
+
+TEST(ProfileMaps, AreStretchedOverTheRasterBilinearly) {
+  ProjectorProfile p = example_with_map();  // the raster is 64 x 48
+  constexpr double kRounding = 1e-15;
+  // Texel centres: the texels themselves; beyond the outermost ones nothing changes.
+  for (int y = 0; y < 3; ++y)
+    for (int x = 0; x < 2; ++x)
+      EXPECT_TRUE(p.reflectance_at({16 + 32 * x, 8 + 16 * y})
+                      .isApprox(p.surface_map(x, y).cast<double>(), kRounding));
+  EXPECT_EQ(p.reflectance_at({64, 48}), p.reflectance_at({48, 40}));
+  EXPECT_EQ(p.vignetting_at({0, 0}), p.vignetting_at({64.0 / 6, 12}));
+  // Between four: the weights of GL, here a quarter of the way right and three quarters down.
+  const Eigen::Vector3d expected = (1 - 0.25 * 0.75) * p.surface_map(0, 1).cast<double>() +
+                                   0.25 * 0.75 * p.surface_map(1, 2).cast<double>();
+  EXPECT_TRUE(p.reflectance_at({24, 36}).isApprox(expected, kRounding));
+  // A map's own size does not matter: one that is linear is looked up the same at any size.
+  const auto ramp = [](int width, int height) {
+    Image<float> map(width, height);
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x)
+        map(x, y) = static_cast<float>(1 + (x + 0.5) / width + 2 * (y + 0.5) / height);
+    return map;
+  };
+  for (const auto& [width, height] : {std::pair(4, 4), std::pair(64, 48), std::pair(7, 100)}) {
+    p.vignetting = ramp(width, height);
+    EXPECT_NEAR(p.vignetting_at({20, 30}), 1 + 20.0 / 64 + 2 * 30.0 / 48, 1e-6);
+  }
+  p.surface_map = {};
+  EXPECT_EQ(p.reflectance_at({5, 6}), Eigen::Vector3d::Ones());
+  p.vignetting = {};
+  EXPECT_EQ(p.vignetting_at({5, 6}), 1.0);
+}
 
 TEST(ProfileCheck, RefusesEveryMistake) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -199,9 +282,15 @@ TEST(ProfileCheck, RefusesEveryMistake) {
       {"vignetting", [](ProjectorProfile& p) { p.vignetting = {}; }},
       {"vignetting", [](ProjectorProfile& p) { p.vignetting(0, 0) = 0; }},
       {"vignetting", [](ProjectorProfile& p) { p.vignetting(2, 1) = std::nanf(""); }},
+      {"map", [](ProjectorProfile& p) { p.surface_map(0, 1).x() = 0; }},
+      {"map", [](ProjectorProfile& p) { p.surface_map(1, 2).y() = std::nanf(""); }},
+      {"map", [](ProjectorProfile& p) { p.surface_map(1, 0).z() = HUGE_VALF; }},
+      {"map", [](ProjectorProfile& p) { p.surface_map(0, 0).x() = -1; }},
+      {"map", [](ProjectorProfile& p) { p.surface_map(0, 0).y() = 0.5F * kLeastReflectance; }},
+      {"map", [](ProjectorProfile& p) { p.surface_map(0, 0).z() = 2.0F / kLeastReflectance; }},
   };
   for (std::size_t i = 0; i < mistakes.size(); ++i) {
-    ProjectorProfile profile = example_profile();
+    ProjectorProfile profile = example_with_map();
     mistakes[i].make(profile);
     const Status status = profile.check();
     ASSERT_FALSE(status) << "mistake " << i << ": " << mistakes[i].reason;

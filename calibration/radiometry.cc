@@ -40,21 +40,6 @@ Eigen::Vector2d raster_centre(const ProjectorGeometry& geometry) {
   return {0.5 * geometry.width, 0.5 * geometry.height};
 }
 
-double vignetting_at(const ProjectorProfile& profile, const Eigen::Vector2d& pixel) {
-  const Image<float>& map = profile.vignetting;
-  const double x =
-      std::clamp(pixel.x() / profile.geometry.width * map.width() - 0.5, 0.0, map.width() - 1.0);
-  const double y =
-      std::clamp(pixel.y() / profile.geometry.height * map.height() - 0.5, 0.0, map.height() - 1.0);
-  const int x0 = static_cast<int>(x);
-  const int y0 = static_cast<int>(y);
-  const int x1 = std::min(x0 + 1, map.width() - 1);
-  const int y1 = std::min(y0 + 1, map.height() - 1);
-  const double upper = std::lerp(map(x0, y0), map(x1, y0), x - x0);
-  const double lower = std::lerp(map(x0, y1), map(x1, y1), x - x0);
-  return std::lerp(upper, lower, y - y0);
-}
-
 /// The devices, with retries, averaging and checks of what is read.
 class Session {
  public:
@@ -431,9 +416,12 @@ Xyz predict_reading(const ProjectorProfile& profile,
       output[static_cast<Eigen::Index>(c)] = profile.tone_curves[c].at(code[c]);
     const double slant = std::pow(axis_cosine(profile.geometry, pixel), 3);
     irradiance +=
-        slant * vignetting_at(profile, pixel) * (profile.primaries * output + profile.black);
+        slant * profile.vignetting_at(pixel) * (profile.primaries * output + profile.black);
   }
-  return target == Target::kObject ? Xyz(profile.surface * irradiance) : irradiance;
+  if (target == Target::kWhiteReference) return irradiance;
+  const Eigen::Vector3d in_primaries = profile.primaries.inverse() * irradiance;
+  return profile.surface * profile.primaries *
+         profile.reflectance_at(pixel).cwiseProduct(in_primaries);
 }
 
 Result<MeasuredProfile> measure_profile(Colorimeter& colorimeter,

@@ -67,7 +67,8 @@ struct MeasuredProfile {
 /// a display of exponent 2.2.
 [[nodiscard]] std::vector<std::uint16_t> ramp_codes(int bits, int levels);
 
-/// What the profile expects the colorimeter to read (XYZ, cd/m^2), see Target.
+/// What the profile expects the colorimeter to read (XYZ, cd/m^2), see Target. Of the object, it is
+/// the place that `pixel` lights, as the profile's map of the surface has it.
 /// @param pixel  on the raster.   @param code  below 2^bits.
 [[nodiscard]] Xyz predict_reading(const ProjectorProfile& profile,
                                   Target target,

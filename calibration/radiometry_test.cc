@@ -310,6 +310,45 @@ TEST(MeasureProfile, RefusesOptionsOutOfRange) {
   refuses([](auto& o) { o.vignetting_rows = 101; }, "vignetting_rows");
 }
 
+// The map is diagonal in the primaries: on the object, each primary alone comes back with its own
+// factor and its own colour, ambient light is split into the three, and the board knows no map.
+TEST(PredictReading, TakesTheObjectsReflectanceAtThePixel) {
+  FakeProjector projector;
+  const auto measured = projector.measure();
+  ASSERT_TRUE(measured) << measured.error().what;
+  EXPECT_TRUE(measured->profile.surface_map.empty());
+  const ProjectorProfile& even = measured->profile;
+  ProjectorProfile patterned = even;
+  patterned.surface_map = Image<Rgb32f>(2, 1, Rgb32f::Ones());
+  patterned.surface_map(1, 0) = Rgb32f(0.5F, 0.25F, 2.0F);
+  constexpr double kRounding = 1e-12;
+  const Eigen::Vector2d left(100, 200);  // nearer to the edge than the first texel's centre
+  const Eigen::Vector2d right(600, 200);
+  const auto of_object = [](const ProjectorProfile& p,
+                            const Eigen::Vector2d& pixel,
+                            const std::array<std::uint16_t, 3>& code,
+                            bool lit) {
+    return predict_reading(p, Target::kObject, pixel, code, lit);
+  };
+  EXPECT_TRUE(of_object(patterned, left, {200, 100, 50}, true)
+                  .isApprox(of_object(even, left, {200, 100, 50}, true), kRounding));
+  const Xyz board = predict_reading(patterned, Target::kWhiteReference, right, {200, 100, 50});
+  EXPECT_EQ(board, predict_reading(even, Target::kWhiteReference, right, {200, 100, 50}));
+  const std::array<std::array<std::uint16_t, 3>, 3> primaries{
+      {{255, 0, 0}, {0, 255, 0}, {0, 0, 255}}};
+  for (std::size_t c = 0; c < 3; ++c) {
+    const auto added = [&](const ProjectorProfile& p) -> Xyz {
+      return of_object(p, right, primaries[c], true) - of_object(p, right, {0, 0, 0}, true);
+    };
+    const double factor = patterned.surface_map(1, 0)[static_cast<int>(c)];
+    EXPECT_TRUE(added(patterned).isApprox(factor * added(even), kRounding)) << c;
+  }
+  // Ambient light of the green primary's colour comes back with green's factor.
+  patterned.ambient = patterned.primaries.col(1);
+  EXPECT_TRUE(of_object(patterned, right, {0, 0, 0}, false)
+                  .isApprox(0.25 * patterned.surface * patterned.ambient, kRounding));
+}
+
 TEST(VerifyProfile, NoticesAProfileOfAnotherProjector) {
   FakeProjector projector;
   auto measured = projector.measure();
