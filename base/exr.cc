@@ -10,6 +10,7 @@
 
 #include "base/files.h"
 #include "base/image_files.h"
+#include "base/internal_image_size.h"
 
 namespace veneer {
 namespace {
@@ -71,8 +72,11 @@ Result<std::vector<ExrChannel>> read_exr(const fs::path& path) {
   try {
     Imf::InputFile file(path.c_str());
     const Imath::Box2i window = file.header().dataWindow();
-    const int width = window.max.x - window.min.x + 1;
-    const int height = window.max.y - window.min.y + 1;
+    const std::int64_t columns = std::int64_t{window.max.x} - window.min.x + 1;
+    const std::int64_t rows = std::int64_t{window.max.y} - window.min.y + 1;
+    VENEER_TRY(check_image_size(path, columns, rows));
+    const int width = static_cast<int>(columns);
+    const int height = static_cast<int>(rows);
     std::vector<ExrChannel> channels;
     for (auto it = file.header().channels().begin(); it != file.header().channels().end(); ++it) {
       if (it.channel().xSampling != 1 || it.channel().ySampling != 1) {

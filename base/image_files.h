@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -11,7 +12,11 @@
 namespace veneer {
 
 // All writers write whole or not at all (temporary file, then rename) and make missing folders.
-// All readers: kNotFound, kIo, kBadFormat.
+// All readers: kNotFound, kIo, kBadFormat (damaged, or more than kMaxImagePixels).
+
+/// Largest picture that is read, in pixels: 16384 x 16384, above any camera's and any texture's
+/// that GL takes, yet a decoded 16-bit picture of it (1.5 GiB) fits the memory of a common machine.
+inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 28;
 
 [[nodiscard]] Status write_png(const std::filesystem::path& path, ImageView<const Rgb8> image);
 [[nodiscard]] Status write_png(const std::filesystem::path& path, ImageView<const Rgb16> image);

@@ -32,6 +32,17 @@ bool same(const Image<Pixel>& a, const Image<Pixel>& b) {
          std::ranges::equal(a.pixels(), b.pixels());
 }
 
+/// `result` is the refusal of a header that claims an absurd size.
+template <class Image>
+testing::AssertionResult refused_for_its_size(const Result<Image>& result) {
+  if (result) return testing::AssertionFailure() << "it was read";
+  if (result.error().code == Errc::kBadFormat &&
+      result.error().what.find("pixels, more than") != std::string::npos) {
+    return testing::AssertionSuccess();
+  }
+  return testing::AssertionFailure() << result.error().what;
+}
+
 TEST(Image, StartsBlackWhateverThePixel) {
   const Image<Rgb32f> image(3, 2);
   for (const Rgb32f& pixel : image.pixels()) EXPECT_EQ(pixel, Rgb32f::Zero());
@@ -77,6 +88,18 @@ TEST(Png, RefusesDamagedAndMissingFiles) {
   }
 }
 
+TEST(Png, RefusesAHeaderThatClaimsAnAbsurdSize) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "a.png";
+  const auto image = noise<Rgb8>(4, 4);
+  ASSERT_TRUE(write_png(path, image.view()));
+  std::string bytes = read_text(path).value();
+  bytes.replace(16, 8, std::string("\x00\x0f\x42\x40\x00\x0f\x42\x40", 8));  // 10^6 x 10^6
+  bytes.replace(29, 4, "\xd3\x0f\xaf\x2a");                                  // the CRC of that
+  ASSERT_TRUE(write_text(path, bytes));
+  EXPECT_TRUE(refused_for_its_size(read_png(path)));
+}
+
 TEST(Exr, RoundTripsFloatsBitByBit) {
   const TemporaryFolder folder;
   std::vector<ExrChannel> channels{{"a", Image<float>(3, 2)}, {"specular.R", Image<float>(3, 2)}};
@@ -112,11 +135,38 @@ TEST(Exr, RefusesATruncatedFile) {
   EXPECT_EQ(read_exr(path).error().code, Errc::kBadFormat);
 }
 
+TEST(Exr, RefusesAHeaderThatClaimsAnAbsurdSize) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "a.exr";
+  const Image<Rgb32f> image(2, 2);
+  ASSERT_TRUE(write_exr(path, image.view()));
+  std::string bytes = read_text(path).value();
+  const std::string name("dataWindow\0box2i\0\x10\0\0\0", 21);  // then min x, y and max x, y
+  const std::size_t window = bytes.find(name);
+  ASSERT_NE(window, std::string::npos);
+  const std::string max_1023_1048575("\xff\x03\0\0\xff\xff\x0f\0", 8);
+  bytes.replace(window + name.size() + 8, 8, max_1023_1048575);
+  bytes.append(std::size_t{1} << 20, '\0');  // the table of rows, which is read with the header
+  ASSERT_TRUE(write_text(path, bytes));
+  EXPECT_TRUE(refused_for_its_size(read_exr(path)));
+}
+
 TEST(Jpeg, RefusesWhatIsNoJpeg) {
   const TemporaryFolder folder;
   ASSERT_TRUE(write_text(folder.path() / "a.jpg", "no picture"));
   EXPECT_EQ(read_jpeg(folder.path() / "a.jpg").error().code, Errc::kBadFormat);
   EXPECT_EQ(read_jpeg(folder.path() / "b.jpg").error().code, Errc::kNotFound);
+}
+
+TEST(Jpeg, RefusesAHeaderThatClaimsAnAbsurdSize) {
+  const TemporaryFolder folder;
+  // A progressive picture of one component, 65280 x 65280, up to the start of its first scan.
+  static constexpr char kHeader[] =
+      "\xff\xd8"
+      "\xff\xc2\x00\x0b\x08\xff\x00\xff\x00\x01\x01\x11\x00"
+      "\xff\xda\x00\x08\x01\x01\x00\x00\x00\x00";
+  ASSERT_TRUE(write_text(folder.path() / "a.jpg", std::string(kHeader, sizeof kHeader - 1)));
+  EXPECT_TRUE(refused_for_its_size(read_jpeg(folder.path() / "a.jpg")));
 }
 
 TEST(Jpeg, ReadsARealPhotographAndRefusesHalfOfIt) {

@@ -11,6 +11,7 @@
 #include <memory>
 
 #include "base/image_files.h"
+#include "base/internal_image_size.h"
 
 namespace veneer {
 namespace {
@@ -43,11 +44,16 @@ struct Decoder {
   ~Decoder() { jpeg_destroy_decompress(&info); }
 };
 
-// libjpeg reports errors by longjmp, so these two hold no C++ objects.
-bool begin(Decoder& decoder, std::FILE* file) {
+// libjpeg reports errors by longjmp, so these three hold no C++ objects.
+bool read_header(Decoder& decoder, std::FILE* file) {
   if (setjmp(decoder.handler.escape) != 0) return false;
   jpeg_stdio_src(&decoder.info, file);
   jpeg_read_header(&decoder.info, TRUE);
+  return true;
+}
+
+bool begin(Decoder& decoder) {
+  if (setjmp(decoder.handler.escape) != 0) return false;
   decoder.info.out_color_space = JCS_RGB;
   jpeg_start_decompress(&decoder.info);
   return true;
@@ -72,7 +78,12 @@ Result<Image<Rgb8>> read_jpeg(const std::filesystem::path& path) {
     return fail(
         Errc::kNotFound, "reading {}: there is no such file, or it may not be read", path.string());
   Decoder decoder;
-  if (!begin(decoder, file.get())) {
+  if (!read_header(decoder, file.get())) {
+    return fail(Errc::kBadFormat, "reading {}: {}", path.string(), decoder.handler.message);
+  }
+  // Before begin(): of a progressive picture it allocates all coefficients.
+  VENEER_TRY(check_image_size(path, decoder.info.image_width, decoder.info.image_height));
+  if (!begin(decoder)) {
     return fail(Errc::kBadFormat, "reading {}: {}", path.string(), decoder.handler.message);
   }
   Image<Rgb8> image(static_cast<int>(decoder.info.output_width),

@@ -8,6 +8,7 @@
 
 #include "base/files.h"
 #include "base/image_files.h"
+#include "base/internal_image_size.h"
 
 namespace veneer {
 namespace {
@@ -132,10 +133,12 @@ Result<Image<Pixel>> read_image(const std::filesystem::path& path, int depth) {
   }
   const auto width = static_cast<int>(png_get_image_width(reader.png, reader.info));
   const auto height = static_cast<int>(png_get_image_height(reader.png, reader.info));
+  VENEER_TRY(check_image_size(path, width, height));
   VENEER_CHECK(png_get_rowbytes(reader.png, reader.info) ==
                sizeof(Pixel) * static_cast<std::size_t>(width));
   Image<Pixel> image(width, height);
   std::vector<png_bytep> rows;
+  rows.reserve(static_cast<std::size_t>(height));
   for (int y = 0; y < height; ++y) rows.push_back(reinterpret_cast<png_bytep>(&image(0, y)));
   if (!read_rows(reader, rows.data())) {
     return fail(Errc::kBadFormat, "reading {}: {}", path.string(), error);
