@@ -96,6 +96,7 @@ struct SafetensorsFile::State {
   std::map<std::string, TensorView> tensors;
 
   Status parse_tensor(const std::string& name, const json& entry, std::span<const std::byte> body);
+  Status check_layout(std::span<const std::byte> body) const;
 };
 
 Status SafetensorsFile::State::parse_tensor(const std::string& name,
@@ -133,6 +134,43 @@ Status SafetensorsFile::State::parse_tensor(const std::string& name,
         "its data are not aligned to their type; write the file again with an aligned header");
   }
   tensors.emplace(name, std::move(view));
+  return {};
+}
+
+/// The tensors fill the body without overlap, hole or remainder, as the format demands.
+Status SafetensorsFile::State::check_layout(std::span<const std::byte> body) const {
+  struct Extent {
+    std::ptrdiff_t begin;
+    std::ptrdiff_t end;
+    const std::string* name;
+  };
+  std::vector<Extent> extents;
+  extents.reserve(tensors.size());
+  for (const auto& [name, view] : tensors) {
+    const std::ptrdiff_t begin = view.bytes.data() - body.data();
+    extents.push_back({begin, begin + std::ssize(view.bytes), &name});
+  }
+  std::ranges::sort(
+      extents, {}, [](const Extent& extent) { return std::pair(extent.begin, extent.end); });
+  std::ptrdiff_t reached = 0;
+  for (const Extent& extent : extents) {
+    if (extent.begin != reached) {
+      return fail(Errc::kBadFormat,
+                  "reading {}: tensor {} begins at byte {} where {} should follow: the tensors "
+                  "overlap or leave a hole; write the file again",
+                  path.string(),
+                  *extent.name,
+                  extent.begin,
+                  reached);
+    }
+    reached = extent.end;
+  }
+  if (reached != std::ssize(body)) {
+    return fail(Errc::kBadFormat,
+                "reading {}: {} bytes follow its last tensor; write or copy it again",
+                path.string(),
+                std::ssize(body) - reached);
+  }
   return {};
 }
 
@@ -188,6 +226,7 @@ Result<SafetensorsFile> SafetensorsFile::open(const fs::path& path) {
   } catch (const json::exception& error) {
     return fail(Errc::kBadFormat, "reading the header of {}: {}", path.string(), error.what());
   }
+  VENEER_TRY(state->check_layout(body));
   return SafetensorsFile(std::move(state));
 }
 
@@ -280,7 +319,8 @@ Result<SafetensorsWriter> SafetensorsWriter::create(
                  end % size_of((&spec + 1)->dtype) == 0);
     offset = end;
   }
-  std::string text = header.dump();
+  // Paths and remarks need not be UTF-8, JSON must be: what is not becomes U+FFFD.
+  std::string text = header.dump(-1, ' ', false, json::error_handler_t::replace);
   text.append((kAlignment - text.size() % kAlignment) % kAlignment, ' ');
 
   VENEER_ASSIGN(StagedFile staged, StagedFile::create(path));

@@ -69,8 +69,8 @@ struct TensorView {
 /// Format: u64 little-endian header length, JSON header, raw tensors.
 class SafetensorsFile {
  public:
-  /// Errors: kNotFound, kIo, kBadFormat (truncated, header no JSON, offsets outside the file or
-  /// overlapping, size that does not fit the shape, misaligned data).
+  /// Errors: kNotFound, kIo, kBadFormat (truncated, header no JSON, offsets outside the file,
+  /// tensors that overlap or do not fill it, size that does not fit the shape, misaligned data).
   [[nodiscard]] static Result<SafetensorsFile> open(const std::filesystem::path& path);
 
   [[nodiscard]] const std::filesystem::path& path() const;
@@ -101,7 +101,8 @@ struct TensorSpec {
 
 /// Writes a safetensors file that may be larger than memory: the file is laid out and mapped first,
 /// filled by the caller (from several threads, if they write different bytes), then finished.
-/// It exists under `path` only after finish() succeeded; otherwise nothing is left.
+/// It exists under `path` only after finish() succeeded; otherwise nothing is left. Metadata that
+/// are not UTF-8 are stored with U+FFFD for what is not.
 class SafetensorsWriter {
  public:
   [[nodiscard]] static Result<SafetensorsWriter> create(

@@ -14,8 +14,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A file with the header `json` and `body` bytes of data.
-void write_raw(const fs::path& path, const std::string& json, std::size_t body) {
+/// A file with the header `json`, padded so that the data are aligned, and `body` bytes of data.
+void write_raw(const fs::path& path, std::string json, std::size_t body) {
+  json.resize((json.size() + 7) / 8 * 8, ' ');
   std::string text(8, '\0');
   const std::uint64_t length = json.size();
   std::memcpy(text.data(), &length, 8);
@@ -89,13 +90,13 @@ TEST(Safetensors, RefusesHeadersThatLie) {
   for (
       const char* json : {
           R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,16]}})",   // shape and bytes differ
-          R"({"a":{"dtype":"F32","shape":[-2],"data_offsets":[0,8]}})",   // negative extent
-          R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[8,0]}})",    // backwards
-          R"({"a":{"dtype":"F32","shape":[2],"data_offsets":[0,8,9]}})",  // three offsets
-          R"({"a":{"dtype":"BF16","shape":[2],"data_offsets":[0,4]}})",   // a type we do not read
+          R"({"a":{"dtype":"F32","shape":[-4],"data_offsets":[0,16]}})",  // negative extent
+          R"({"a":{"dtype":"F32","shape":[4],"data_offsets":[16,0]}})",   // backwards
+          R"({"a":{"dtype":"F32","shape":[4],"data_offsets":[0,16,16]}})",  // three offsets
+          R"({"a":{"dtype":"BF16","shape":[8],"data_offsets":[0,16]}})",    // a type we do not read
           R"({"a":{"dtype":"F32","shape":[4611686018427387904,4],"data_offsets":[0,16]}})",  // overflow
-          R"({"a":{"shape":[2],"data_offsets":[0,8]}})",            // no type
-          R"({"a":{"dtype":7,"shape":[2],"data_offsets":[0,8]}})",  // a type that is no text
+          R"({"a":{"shape":[4],"data_offsets":[0,16]}})",            // no type
+          R"({"a":{"dtype":7,"shape":[4],"data_offsets":[0,16]}})",  // a type that is no text
           R"({"a":3})",
           R"([1,2])",
           R"({"a")",
@@ -105,6 +106,43 @@ TEST(Safetensors, RefusesHeadersThatLie) {
     ASSERT_FALSE(file) << json;
     EXPECT_EQ(file.error().code, Errc::kBadFormat) << json;
   }
+}
+
+TEST(Safetensors, ReadsTensorsOnlyWhereTheyFillTheFile) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "x";
+  // Two tensors of 8 bytes and an empty one in a body of 16 bytes.
+  const auto open = [&](int a, int b, int empty) {
+    write_raw(path,
+              fmt::format(R"({{"a":{{"dtype":"F32","shape":[2],"data_offsets":[{},{}]}},)"
+                          R"("e":{{"dtype":"F32","shape":[0],"data_offsets":[{},{}]}},)"
+                          R"("b":{{"dtype":"F32","shape":[2],"data_offsets":[{},{}]}}}})",
+                          a,
+                          a + 8,
+                          empty,
+                          empty,
+                          b,
+                          b + 8),
+              16);
+    return SafetensorsFile::open(path);
+  };
+  const auto refused = [&](int a, int b, int empty, std::string_view why) {
+    const auto file = open(a, b, empty);
+    return !file && file.error().code == Errc::kBadFormat &&
+           file.error().what.find(why) != std::string::npos;
+  };
+  for (const int empty : {0, 8}) {
+    EXPECT_TRUE(open(0, 8, empty)) << empty;
+    EXPECT_TRUE(open(8, 0, empty)) << empty;
+  }
+  EXPECT_TRUE(refused(0, 4, 0, "overlap"));
+  EXPECT_TRUE(refused(0, 0, 0, "overlap"));
+  EXPECT_TRUE(refused(4, 8, 4, "overlap"));
+  EXPECT_TRUE(refused(0, 8, 4, "overlap"));
+  write_raw(path, R"({"a":{"dtype":"U8","shape":[9],"data_offsets":[0,9]}})", 16);
+  const auto longer = SafetensorsFile::open(path);
+  ASSERT_FALSE(longer);
+  EXPECT_NE(longer.error().what.find("7 bytes follow"), std::string::npos) << longer.error().what;
 }
 
 TEST(Safetensors, RefusesAnAbsurdHeaderLength) {
@@ -117,6 +155,15 @@ TEST(Safetensors, RefusesFoldersAndMissingFiles) {
   const TemporaryFolder folder;
   EXPECT_FALSE(SafetensorsFile::open(folder.path()));
   EXPECT_EQ(SafetensorsFile::open(folder.path() / "none").error().code, Errc::kNotFound);
+}
+
+TEST(SafetensorsWriter, TakesMetadataThatAreNotUtf8) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "x";
+  auto writer = SafetensorsWriter::create(path, {{"a", DType::kF32, {1}}}, {{"from", "caf\xe9/"}});
+  ASSERT_TRUE(writer) << writer.error().what;
+  ASSERT_TRUE(writer->finish());
+  EXPECT_EQ(SafetensorsFile::open(path).value().meta("from").value(), "caf\xef\xbf\xbd/");
 }
 
 TEST(SafetensorsWriter, LeavesNothingWhenAbandoned) {
