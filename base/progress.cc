@@ -21,11 +21,14 @@ class StderrProgress final : public Progress {
   explicit StderrProgress(bool terminal)
       : terminal_(terminal),
         interval_(terminal ? std::chrono::milliseconds(100) : std::chrono::milliseconds(5000)) {}
-  ~StderrProgress() override { finish({}); }
+  ~StderrProgress() override {
+    const std::scoped_lock lock(mutex_);
+    abandon();
+  }
 
   void start(std::string_view label, std::int64_t total) override {
-    finish({});
     const std::scoped_lock lock(mutex_);
+    abandon();
     label_ = label;
     total_ = std::max<std::int64_t>(total, 1);
     done_ = 0;
@@ -65,6 +68,12 @@ class StderrProgress final : public Progress {
   }
 
  private:
+  /// Ends the line of a stage that nobody finished: it may have failed, so nothing is claimed.
+  void abandon() {
+    if (running_ && terminal_) fmt::print(stderr, "\n");
+    running_ = false;
+  }
+
   [[nodiscard]] double percent() const {
     return std::min(100.0, 100.0 * static_cast<double>(done_) / static_cast<double>(total_));
   }

@@ -12,7 +12,8 @@ namespace veneer {
 class Progress {
  public:
   virtual ~Progress() = default;
-  /// Begins a stage of `total` steps and ends the one before.
+  /// Begins a stage of `total` steps. One before it that was not finished is dropped without a word
+  /// of success, as by the destructor.
   virtual void start(std::string_view label, std::int64_t total) = 0;
   virtual void advance(std::int64_t steps = 1) = 0;
   /// Ends the stage. `remark` is added to its line (a figure that was reached), may be empty.
