@@ -13,6 +13,7 @@
 
 #include "base/clock.h"
 #include "base/random.h"
+#include "base/statistics.h"
 #include "render/compensate_pass.h"
 #include "render/draw_pass.h"
 #include "render/egl_context.h"
@@ -100,11 +101,6 @@ btf::ModelShader plain_textures() {
   return shader;
 }
 
-double quantile(std::vector<double> values, double part) {
-  std::ranges::sort(values);
-  return values[static_cast<std::size_t>(part * static_cast<double>(values.size() - 1) + 0.5)];
-}
-
 // One thing to time: a draw, or the compensation of what was drawn before it.
 struct Entrant {
   RenderTiming timing;
@@ -118,9 +114,7 @@ class Bench {
   static Result<Bench> create(EglContext context, const RenderBenchOptions& options) {
     const calibration::ProjectorProfile profile = bench_profile(options.width, options.height);
     const Compensation compensation(profile, {});
-    const Image<float> vignetting = vignetting_raster(profile);
-    VENEER_ASSIGN(CompensatePass compensate,
-                  CompensatePass::create(compensation, vignetting.view()));
+    VENEER_ASSIGN(CompensatePass compensate, CompensatePass::create(compensation, profile));
     Bench bench(std::move(context), profile, std::move(compensate));
     const btf::ModelShader plain = plain_textures();
     VENEER_TRY(bench.add(

@@ -108,6 +108,22 @@ GlTexture upload_levels(const Compensation& compensation) {
   return texture;
 }
 
+// A picture of floats, without padding.
+template <class Pixel>
+GlTexture upload(GLenum internal_format, GLenum format, const Image<Pixel>& image) {
+  GlTexture texture = make_texture_2d(internal_format, image.width(), image.height());
+  glTextureSubImage2D(texture.id(),
+                      0,
+                      0,
+                      0,
+                      image.width(),
+                      image.height(),
+                      format,
+                      GL_FLOAT,
+                      image.pixels().data());
+  return texture;
+}
+
 GLsizei groups(int pixels, int per_group) { return (pixels + per_group - 1) / per_group; }
 
 }  // namespace
@@ -124,10 +140,10 @@ std::string fullscreen_vertex_source() { return std::string(kVersion) + kFullscr
 std::string count_compute_source() { return std::string(kVersion) + kCountComp; }
 
 Result<CompensatePass> CompensatePass::create(const Compensation& compensation,
-                                              ImageView<const float> vignetting) {
+                                              const calibration::ProjectorProfile& profile) {
   CompensatePass pass;
-  pass.width_ = vignetting.width();
-  pass.height_ = vignetting.height();
+  pass.width_ = profile.geometry.width;
+  pass.height_ = profile.geometry.height;
   VENEER_ASSIGN(pass.program_,
                 link_program({{GL_VERTEX_SHADER, "fullscreen.vert", fullscreen_vertex_source()},
                               {GL_FRAGMENT_SHADER,
@@ -141,19 +157,10 @@ Result<CompensatePass> CompensatePass::create(const Compensation& compensation,
   pass.constants_ = make_buffer(&block, sizeof(block), 0);
   pass.seeds_ = upload_seeds(compensation);
   pass.levels_ = upload_levels(compensation);
-  pass.vignetting_ = make_texture_2d(GL_R32F, pass.width_, pass.height_);
-  glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-  glPixelStorei(GL_UNPACK_ROW_LENGTH, static_cast<GLint>(vignetting.stride()));
-  glTextureSubImage2D(pass.vignetting_.id(),
-                      0,
-                      0,
-                      0,
-                      pass.width_,
-                      pass.height_,
-                      GL_RED,
-                      GL_FLOAT,
-                      vignetting.data());
-  glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
+  const Image<float> vignetting = vignetting_raster(profile);
+  pass.vignetting_ = upload(GL_R32F, GL_RED, vignetting);
+  const Image<Rgb32f> reflectance = reflectance_raster(profile);
+  pass.reflectance_ = upload(GL_RGB32F, GL_RGB, reflectance);
   pass.codes_ = make_texture_2d(GL_RGBA16UI, pass.width_, pass.height_);
   pass.framebuffer_ = make_framebuffer();
   glNamedFramebufferTexture(pass.framebuffer_.id(), GL_COLOR_ATTACHMENT0, pass.codes_.id(), 0);
@@ -196,6 +203,7 @@ void CompensatePass::run(GLuint target, std::uint32_t dither_seed) {
   glBindTextureUnit(1, vignetting_.id());
   glBindTextureUnit(2, seeds_.id());
   glBindTextureUnit(3, levels_.id());
+  glBindTextureUnit(4, reflectance_.id());
   glBindVertexArray(no_vertices_.id());
   glDrawArrays(GL_TRIANGLES, 0, 3);
 

@@ -31,9 +31,10 @@ class CompensatePass {
     double gamut_loss = 0;  ///< sum over the pixels
   };
 
-  /// @param vignetting  of the raster's size. Errors: kUnavailable (the driver refuses a shader).
+  /// @param profile  the one that `compensation` was made of.
+  /// Errors: kUnavailable (the driver refuses a shader).
   [[nodiscard]] static Result<CompensatePass> create(const Compensation& compensation,
-                                                     ImageView<const float> vignetting);
+                                                     const calibration::ProjectorProfile& profile);
   CompensatePass(CompensatePass&&) noexcept = default;
   CompensatePass& operator=(CompensatePass&&) = delete;
   ~CompensatePass();
@@ -62,6 +63,7 @@ class CompensatePass {
   GlTexture levels_;
   GlBuffer counters_;  // kRing slots, mapped for good
   GlTexture vignetting_;
+  GlTexture reflectance_;
   GlTexture codes_;
   GlFramebuffer framebuffer_;
   GlVertexArray no_vertices_;

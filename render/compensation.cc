@@ -71,11 +71,15 @@ Compensation::Compensation(const calibration::ProjectorProfile& profile,
       tone_levels_(levels_of(profile, options.compensate)) {}
 
 // pixel.drive holds t as solved, outside [0, 1]; leaves it inside, with the loss.
-void Compensation::map_to_gamut(const Xyz& target, double g, CompensatedPixel& pixel) const {
+void Compensation::map_to_gamut(const Xyz& target,
+                                double g,
+                                const Vector3d& reflectance,
+                                CompensatedPixel& pixel) const {
   const Constants& c = constants_;
+  const Vector3d gain = g * reflectance;
   const Vector3d offset = c.drive_of_ambient / g + c.drive_of_black;
   const auto drive_of = [&](const Vector3d& cones) -> Vector3d {
-    return c.drive_from_cones * cones / g - offset;
+    return (c.drive_from_cones * cones).cwiseQuotient(gain) - offset;
   };
   const Ipt wanted = ipt_from_cones(c.cones_from_target * target);
 
@@ -83,7 +87,7 @@ void Compensation::map_to_gamut(const Xyz& target, double g, CompensatedPixel& p
   double darkest = 0.0;
   double brightest = HUGE_VAL;
   for (int i = 0; i < 3; ++i) {
-    const double a = c.drive_of_white[i] / g;
+    const double a = c.drive_of_white[i] / gain[i];
     const double at_zero = offset[i] / a;
     const double at_one = (1.0 + offset[i]) / a;
     darkest = std::max(darkest, std::min(at_zero, at_one));
@@ -91,7 +95,7 @@ void Compensation::map_to_gamut(const Xyz& target, double g, CompensatedPixel& p
   }
   if (!(darkest <= brightest)) {
     pixel.drive = pixel.drive.cwiseMax(0.0).cwiseMin(1.0);
-    const Vector3d shown = c.cones_from_drive * ((pixel.drive + offset) * g);
+    const Vector3d shown = c.cones_from_drive * (pixel.drive + offset).cwiseProduct(gain);
     pixel.gamut_loss = 100.0 * (wanted - ipt_from_cones(shown)).norm();
     return;
   }
@@ -112,6 +116,7 @@ void Compensation::map_to_gamut(const Xyz& target, double g, CompensatedPixel& p
 CompensatedPixel Compensation::pixel(const Xyz& target,
                                      double geometry,
                                      double vignetting,
+                                     const Vector3d& reflectance,
                                      std::uint32_t x,
                                      std::uint32_t y,
                                      std::uint32_t dither_seed) const {
@@ -123,11 +128,13 @@ CompensatedPixel Compensation::pixel(const Xyz& target,
     return result;
   }
   result.state = PixelState::kInGamut;
-  result.drive = (constants_.drive_from_target * target - constants_.drive_of_ambient) / g -
-                 constants_.drive_of_black;
+  const Vector3d s = constants_.compensate ? reflectance : Vector3d::Ones();
+  result.drive =
+      ((constants_.drive_from_target * target).cwiseQuotient(s) - constants_.drive_of_ambient) / g -
+      constants_.drive_of_black;
   if (!is_inside(result.drive, kGamutTolerance)) {
     result.state = PixelState::kOutOfGamut;
-    if (constants_.compensate) map_to_gamut(target, g, result);
+    if (constants_.compensate) map_to_gamut(target, g, s, result);
   }
   result.drive = result.drive.cwiseMax(0.0).cwiseMin(1.0);
   for (std::uint32_t i = 0; i < 3; ++i) {
@@ -139,29 +146,20 @@ CompensatedPixel Compensation::pixel(const Xyz& target,
 }
 
 Image<float> vignetting_raster(const calibration::ProjectorProfile& profile) {
-  const int width = profile.geometry.width;
-  const int height = profile.geometry.height;
-  Image<float> raster(width, height, 1.0F);
-  const Image<float>& map = profile.vignetting;
-  if (map.empty()) return raster;
-  // Between which two of `size` samples the centre of pixel i of `count` lies, and how far along.
-  struct Between {
-    int first, second;
-    double part;
-  };
-  const auto locate = [](int i, int count, int size) {
-    const double position = std::clamp((i + 0.5) * size / count - 0.5, 0.0, size - 1.0);
-    const int first = std::min(static_cast<int>(position), size - 1);
-    return Between{first, std::min(first + 1, size - 1), position - first};
-  };
-  for (int y = 0; y < height; ++y) {
-    const Between v = locate(y, height, map.height());
-    for (int x = 0; x < width; ++x) {
-      const Between u = locate(x, width, map.width());
-      const double top = std::lerp(map(u.first, v.first), map(u.second, v.first), u.part);
-      const double bottom = std::lerp(map(u.first, v.second), map(u.second, v.second), u.part);
-      raster(x, y) = static_cast<float>(std::lerp(top, bottom, v.part));
-    }
+  Image<float> raster(profile.geometry.width, profile.geometry.height);
+  for (int y = 0; y < raster.height(); ++y) {
+    for (int x = 0; x < raster.width(); ++x)
+      raster(x, y) = static_cast<float>(profile.vignetting_at({x + 0.5, y + 0.5}));
+  }
+  return raster;
+}
+
+Image<Rgb32f> reflectance_raster(const calibration::ProjectorProfile& profile) {
+  if (profile.surface_map.empty()) return {1, 1, Rgb32f::Ones()};
+  Image<Rgb32f> raster(profile.geometry.width, profile.geometry.height);
+  for (int y = 0; y < raster.height(); ++y) {
+    for (int x = 0; x < raster.width(); ++x)
+      raster(x, y) = profile.reflectance_at({x + 0.5, y + 0.5}).cast<float>();
   }
   return raster;
 }

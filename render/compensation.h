@@ -37,7 +37,8 @@ inline constexpr int kGamutSteps = 12;
 
 /// Compensation in double precision: what shaders/compensate.frag does, pixel by pixel.
 ///
-/// With the model of ProjectorProfile, t = (M^-1 A^-1 L - M^-1 E) / G - M^-1 k. Where a component
+/// With the model of ProjectorProfile, t = (M^-1 A^-1 L / s - M^-1 E) / G - M^-1 k, where s divides
+/// each primary's component by the surface's reflectance for it at this pixel. Where a component
 /// of t is outside [0, 1] (over white, over a primary, under black and ambient), the target is
 /// moved in IPT, relative to the white M 1 + k, on a straight line to a point of the achromatic
 /// axis, as little as brings it into reach: hue is kept exactly. That point's lightness is the
@@ -60,9 +61,11 @@ class Compensation {
   /// @param target  XYZ in cd/m^2.
   /// @param geometry  cos(theta_p) (r_ref / r)^2; <= 0 is not covered.
   /// @param vignetting  at this pixel.
+  /// @param reflectance  s at this pixel, see ProjectorProfile::surface_map.
   [[nodiscard]] CompensatedPixel pixel(const Xyz& target,
                                        double geometry,
                                        double vignetting,
+                                       const Eigen::Vector3d& reflectance,
                                        std::uint32_t x,
                                        std::uint32_t y,
                                        std::uint32_t dither_seed) const;
@@ -84,13 +87,18 @@ class Compensation {
   [[nodiscard]] const std::array<ToneLevels, 3>& tone_levels() const { return tone_levels_; }
 
  private:
-  void map_to_gamut(const Xyz& target, double g, CompensatedPixel& pixel) const;
+  void map_to_gamut(const Xyz& target,
+                    double g,
+                    const Eigen::Vector3d& reflectance,
+                    CompensatedPixel& pixel) const;
   Constants constants_;
   std::array<ToneLevels, 3> tone_levels_;
 };
 
-/// The profile's vignetting at every pixel of its raster, stretched over it bilinearly with the
-/// outer texel centres' values kept to the edge; 1 everywhere where the profile has none.
+/// The profile's vignetting at every pixel of its raster.
 [[nodiscard]] Image<float> vignetting_raster(const calibration::ProjectorProfile& profile);
+/// The surface's relative reflectance at every pixel of the raster, or where the profile has no map
+/// of it a single white pixel, which stands for all.
+[[nodiscard]] Image<Rgb32f> reflectance_raster(const calibration::ProjectorProfile& profile);
 
 }  // namespace veneer::render

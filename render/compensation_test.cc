@@ -23,10 +23,14 @@ const calibration::ProjectorProfile& profile() {
   return kProfile;
 }
 
+const Vector3d kEven = Vector3d::Ones();  // a surface without a map
+
 // The image formation as ProjectorProfile states it, written down again.
-Xyz shown(const Vector3d& t, double g) {
+Xyz shown(const Vector3d& t, double g, const Vector3d& reflectance = kEven) {
   const auto& p = profile();
-  return p.surface * (g * (p.primaries * t + p.black) + p.ambient);
+  const Eigen::Matrix3d surface =
+      p.surface * p.primaries * reflectance.asDiagonal() * p.primaries.inverse();
+  return surface * (g * (p.primaries * t + p.black) + p.ambient);
 }
 Vector3d light_of(const std::array<std::uint16_t, 3>& codes) {
   const auto& curves = profile().tone_curves;
@@ -40,7 +44,7 @@ Ipt ipt_of(const Xyz& xyz) {
   return ipt_from_cones((cones_from_xyz() * xyz).cwiseQuotient(cones_from_xyz() * white));
 }
 CompensatedPixel compensate(const Compensation& compensation, const Xyz& target, double g) {
-  return compensation.pixel(target, g, 1.0, 3, 5, 7);
+  return compensation.pixel(target, g, 1.0, kEven, 3, 5, 7);
 }
 
 // A few thousand roundings of 1, amplified by the condition of M and A.
@@ -62,9 +66,32 @@ TEST(Compensation, SendsEveryReachableTargetExactly) {
 TEST(Compensation, VignettingAndGeometryMultiply) {
   const Compensation compensation(profile(), {});
   const Xyz target = shown({0.4, 0.5, 0.6}, 0.7);
-  const auto whole = compensation.pixel(target, 0.7, 1.0, 0, 0, 0);
-  const auto parts = compensation.pixel(target, 1.4, 0.5, 0, 0, 0);
+  const auto whole = compensation.pixel(target, 0.7, 1.0, kEven, 0, 0, 0);
+  const auto parts = compensation.pixel(target, 1.4, 0.5, kEven, 0, 0, 0);
   EXPECT_LT((whole.drive - parts.drive).norm(), kSolveTolerance);
+}
+
+// Dark and light texels of any colour: from a fiftieth of the reference to three times as much.
+Vector3d random_reflectance(Pcg32& random) {
+  const auto factor = [&random] { return 0.02 * std::pow(150.0, random.uniform()); };
+  return {factor(), factor(), factor()};
+}
+
+TEST(Compensation, SendsReachableTargetsFromAPatternedSurface) {
+  const Compensation compensation(profile(), {});
+  Pcg32 random(8);
+  for (int i = 0; i < 2000; ++i) {
+    const double g = 0.05 + 2 * random.uniform();
+    const Vector3d s = random_reflectance(random);
+    const Vector3d t = random_drive(random);
+    const Xyz target = shown(t, g, s);
+    const CompensatedPixel pixel = compensation.pixel(target, g, 1.0, s, 3, 5, 7);
+    ASSERT_EQ(pixel.state, PixelState::kInGamut);
+    // M^-1 A^-1 L is a sum of terms as large as the best reflected primary's.
+    const double amplified = s.maxCoeff() / s.minCoeff();
+    ASSERT_LT((pixel.drive - t).norm(), kSolveTolerance * amplified) << s.transpose();
+    ASSERT_LT((shown(pixel.drive, g, s) - target).norm(), kSolveTolerance * target.norm());
+  }
 }
 
 // The bisection ends this close to the gamut's border, as a part of the way from the axis.
@@ -101,6 +128,61 @@ TEST(Compensation, MappedColoursKeepTheirHueAndCountTheirLoss) {
   EXPECT_GT(mapped, 1000);
 }
 
+TEST(Compensation, MapsToWhatThePatternedSurfaceCanShow) {
+  const Compensation compensation(profile(), {});
+  Pcg32 random(9);
+  int mapped = 0;
+  int on_axis_line = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const double g = 0.2 + random.uniform();
+    const Vector3d s = random_reflectance(random);
+    const Xyz target = shown(4.0 * random_drive(random) - Vector3d::Constant(1.0), g, s);
+    if (target.minCoeff() < 0) continue;  // no light
+    const CompensatedPixel pixel = compensation.pixel(target, g, 1.0, s, 3, 5, 7);
+    ASSERT_GE(pixel.drive.minCoeff(), 0.0);
+    ASSERT_LE(pixel.drive.maxCoeff(), 1.0);
+    if (pixel.state != PixelState::kOutOfGamut) continue;
+    ++mapped;
+    const Ipt wanted = ipt_of(target);
+    const Ipt got = ipt_of(shown(pixel.drive, g, s));
+    ASSERT_NEAR(pixel.gamut_loss, 100 * (wanted - got).norm(), 1e-6) << s.transpose();
+    const double cross = wanted.y() * got.z() - wanted.z() * got.y();
+    if (std::abs(cross) < 1e-9) ++on_axis_line;
+  }
+  EXPECT_GT(mapped, 1000);
+  // Where ambient light alone colours the texel beyond any neutral, the hue is lost by design.
+  EXPECT_GT(on_axis_line, 0.9 * mapped);
+}
+
+// A pixel that reflects half of every primary needs what an even surface needs for twice the light.
+TEST(Compensation, AGreyTexelIsAnEvenSurfaceWithABrighterTarget) {
+  const Compensation compensation(profile(), {});
+  Pcg32 random(10);
+  for (int i = 0; i < 500; ++i) {
+    const Xyz target = shown(random_drive(random), 0.6);
+    const auto grey = compensation.pixel(0.5 * target, 0.6, 1.0, Vector3d::Constant(0.5), 1, 2, 3);
+    const auto even = compensation.pixel(target, 0.6, 1.0, kEven, 1, 2, 3);
+    ASSERT_EQ(grey.state, even.state);
+    ASSERT_LT((grey.drive - even.drive).norm(), kSolveTolerance);
+  }
+}
+
+TEST(Compensation, StaysFiniteAtTheEndsOfReflectance) {
+  const Compensation compensation(profile(), {});
+  constexpr double kLeast = calibration::kLeastReflectance;
+  for (const double s : {kLeast, 1.0 / kLeast}) {
+    for (const double other : {kLeast, 1.0, 1.0 / kLeast}) {
+      for (const double light : {0.0, 1e-3, 50.0, 65504.0}) {
+        const auto pixel =
+            compensation.pixel(Xyz::Constant(light), 0.05, 1.0, {s, other, 1.0}, 1, 2, 3);
+        EXPECT_GE(pixel.drive.minCoeff(), 0.0) << s << ' ' << other << ' ' << light;
+        EXPECT_LE(pixel.drive.maxCoeff(), 1.0) << s << ' ' << other << ' ' << light;
+        EXPECT_TRUE(std::isfinite(pixel.gamut_loss)) << s << ' ' << other << ' ' << light;
+      }
+    }
+  }
+}
+
 TEST(Compensation, GamutMappingIsContinuousAtTheBorder) {
   const Compensation compensation(profile(), {});
   Pcg32 random(3);
@@ -130,7 +212,7 @@ TEST(Compensation, ClampsWhereNoNeutralCanBeShown) {
   auto tinted = profile();
   tinted.ambient = {60, 20, 1};  // far more red than the projector's blue can balance at this G
   const Compensation compensation(tinted, {});
-  const auto pixel = compensation.pixel({0.5, 0.5, 3.0}, 0.06, 1.0, 0, 0, 0);
+  const auto pixel = compensation.pixel({0.5, 0.5, 3.0}, 0.06, 1.0, kEven, 0, 0, 0);
   EXPECT_EQ(pixel.state, PixelState::kOutOfGamut);
   EXPECT_GE(pixel.drive.minCoeff(), 0.0);
   EXPECT_LE(pixel.drive.maxCoeff(), 1.0);
@@ -170,7 +252,7 @@ TEST(Compensation, DitherShowsTheTargetInTheMean) {
     for (std::uint32_t y = 0; y < kSide; ++y) {
       for (std::uint32_t x = 0; x < kSide; ++x) {
         const auto pixel =
-            compensation.pixel(target, 0.9, 1.0, x, y, static_cast<std::uint32_t>(i));
+            compensation.pixel(target, 0.9, 1.0, kEven, x, y, static_cast<std::uint32_t>(i));
         sum += light_of(pixel.codes);
       }
     }
@@ -231,7 +313,8 @@ TEST(Compensation, SwitchedOffShowsPlainSrgb) {
   Pcg32 random(6);
   for (int i = 0; i < 500; ++i) {
     const Vector3d rgb = 1.2 * random_drive(random);
-    const auto pixel = off.pixel(white * (xyz_from_srgb() * rgb), 0.3, 0.5, 1, 2, 3);
+    const auto pixel =
+        off.pixel(white * (xyz_from_srgb() * rgb), 0.3, 0.5, {0.2, 0.5, 2.0}, 1, 2, 3);
     const bool in_gamut = rgb.maxCoeff() <= 1 + kGamutTolerance;
     EXPECT_EQ(pixel.state, in_gamut ? PixelState::kInGamut : PixelState::kOutOfGamut);
     for (int c = 0; c < 3; ++c) {
@@ -268,6 +351,19 @@ TEST(VignettingRaster, StretchesTheMapBilinearly) {
   auto without = p;
   without.vignetting = {};
   EXPECT_EQ(vignetting_raster(without)(5, 5), 1.0F);
+}
+
+TEST(ReflectanceRaster, IsTheMapAtEveryPixelOrOneWhitePixel) {
+  auto p = profile();
+  const Image<Rgb32f> none = reflectance_raster(p);
+  ASSERT_EQ(none.pixels().size(), 1U);
+  EXPECT_EQ(none(0, 0), Rgb32f::Ones());
+  p.surface_map = example_surface_map();
+  const Image<Rgb32f> raster = reflectance_raster(p);
+  ASSERT_EQ(raster.width(), 64);
+  ASSERT_EQ(raster.height(), 48);
+  EXPECT_EQ(raster(0, 0), p.surface_map(0, 0));
+  EXPECT_EQ(raster(40, 20), Rgb32f(p.reflectance_at({40.5, 20.5}).cast<float>()));
 }
 
 }  // namespace

@@ -83,4 +83,17 @@ inline calibration::ProjectorProfile example_profile(int width, int height, int 
   return profile;
 }
 
+/// A surface whose reflectance varies strongly, by other amounts for each primary.
+inline Image<Rgb32f> example_surface_map() {
+  Image<Rgb32f> map(7, 5);
+  for (int y = 0; y < map.height(); ++y) {
+    for (int x = 0; x < map.width(); ++x) {
+      map(x, y) = Rgb32f(x % 2 == 0 ? 1.2F : 0.3F,
+                         0.15F + 0.2F * static_cast<float>(y),
+                         (x + y) % 3 == 0 ? 0.2F : 0.8F);
+    }
+  }
+  return map;
+}
+
 }  // namespace veneer::render

@@ -72,9 +72,7 @@ class GlRenderer final : public Renderer {
         DrawPass draw,
         DrawPass::create(material.shader(), scene.lights, scene.texture_repeats, profile));
     const Compensation compensation(profile, options);
-    const Image<float> vignetting = vignetting_raster(profile);
-    VENEER_ASSIGN(CompensatePass compensate,
-                  CompensatePass::create(compensation, vignetting.view()));
+    VENEER_ASSIGN(CompensatePass compensate, CompensatePass::create(compensation, profile));
     auto renderer = std::unique_ptr<GlRenderer>(new GlRenderer(
         std::move(context), scene.mesh, profile.geometry, std::move(draw), std::move(compensate)));
     if (glCheckNamedFramebufferStatus(renderer->target_framebuffer_.id(), GL_FRAMEBUFFER) !=

@@ -20,6 +20,7 @@ layout(binding = 0) uniform sampler2D target_texture;
 layout(binding = 1) uniform sampler2D vignetting_texture;
 layout(binding = 2) uniform usampler2D seeds_texture;  // row: channel; lowest and highest level
 layout(binding = 3) uniform sampler2D levels_texture;  // output and code, LEVELS_WIDTH to a row
+layout(binding = 4) uniform sampler2D reflectance_texture;  // of the raster's size, or one texel
 uniform uint dither_seed;
 
 layout(location = 0) out uvec4 codes;  // a: PixelState << 14 | gamut loss in units of 1/64
@@ -44,18 +45,19 @@ bool is_inside(vec3 drive, float tolerance) {
 }
 
 // The drive nearest to the target in its own hue, and the loss in IPT x 100.
-vec4 map_to_gamut(vec3 target, vec3 drive, float g, int steps) {
+vec4 map_to_gamut(vec3 target, vec3 drive, float g, vec3 reflectance, int steps) {
+  vec3 gain = g * reflectance;
   vec3 offset = constants.drive_of_ambient.xyz / g + constants.drive_of_black.xyz;
   vec3 wanted = kIptFromPowers * signed_power(mat3(constants.cones_from_target) * target, kIptExponent);
 
-  vec3 neutral = constants.drive_of_white.xyz / g;
+  vec3 neutral = constants.drive_of_white.xyz / gain;
   vec3 at_zero = offset / neutral;
   vec3 at_one = (1.0 + offset) / neutral;
   float darkest = max(0.0, largest(min(at_zero, at_one)));
   float brightest = smallest(max(at_zero, at_one));
   if (!(darkest <= brightest)) {
     drive = clamp(drive, 0.0, 1.0);
-    vec3 shown = mat3(constants.cones_from_drive) * ((drive + offset) * g);
+    vec3 shown = mat3(constants.cones_from_drive) * ((drive + offset) * gain);
     return vec4(drive, 100.0 * distance(wanted, kIptFromPowers * signed_power(shown, kIptExponent)));
   }
   float low = pow(darkest, kIptExponent);
@@ -68,7 +70,9 @@ vec4 map_to_gamut(vec3 target, vec3 drive, float g, int steps) {
   mat3 powers_from_ipt = inverse(kIptFromPowers);
   vec3 powers_at_anchor = vec3(anchor.x);  // on the axis the three are equal
   vec3 powers_along_way = powers_from_ipt * way;
-  mat3 drive_from_cones = mat3(constants.drive_from_cones) / g;
+  vec3 per_gain = 1.0 / gain;  // of each row
+  mat3 drive_from_cones = matrixCompMult(mat3(per_gain, per_gain, per_gain),
+                                         mat3(constants.drive_from_cones));
   float kept = 0.0;
   float part = 0.5;
   vec3 mapped = neutral * pow(anchor.x, 1.0 / kIptExponent) - offset;
@@ -134,8 +138,11 @@ void main() {
   if (texel.a <= 0.0) return;
 #ifdef COMPENSATE
   float g = texel.a * texelFetch(vignetting_texture, pixel, 0).r;
+  ivec2 last = textureSize(reflectance_texture, 0) - 1;
+  vec3 reflectance = texelFetch(reflectance_texture, min(pixel, last), 0).rgb;
 #else
   float g = 1.0;
+  const vec3 reflectance = vec3(1.0);
 #endif
   bool finite = dot(abs(texel), vec4(1.0)) < kFinite;
   bool reached = g >= constants.geometry_floor;
@@ -143,14 +150,15 @@ void main() {
     codes.a = kOutOfReach << 14;
     return;
   }
-  vec3 drive = (mat3(constants.drive_from_target) * texel.rgb - constants.drive_of_ambient.xyz) / g -
+  vec3 drive = (mat3(constants.drive_from_target) * texel.rgb / reflectance -
+                constants.drive_of_ambient.xyz) / g -
                constants.drive_of_black.xyz;
   uint state = kInGamut;
   float loss = 0.0;
   if (!is_inside(drive, constants.gamut_tolerance)) {
     state = kOutOfGamut;
 #ifdef COMPENSATE
-    vec4 mapped = map_to_gamut(texel.rgb, drive, g, constants.gamut_steps);
+    vec4 mapped = map_to_gamut(texel.rgb, drive, g, reflectance, constants.gamut_steps);
     drive = mapped.xyz;
     loss = mapped.w;
 #endif
