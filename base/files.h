@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "base/result.h"
+#include "base/unique_handle.h"
 
 namespace veneer {
 
@@ -16,7 +17,8 @@ namespace veneer {
 [[nodiscard]] Status write_text(const std::filesystem::path& path, std::string_view text);
 
 /// A file that is being written beside its final place. commit() puts it there; without it the
-/// destructor removes what was written.
+/// destructor removes what was written. What a killed program left of the same name is removed by
+/// the next create(): it is no longer locked.
 class StagedFile {
  public:
   [[nodiscard]] static Result<StagedFile> create(const std::filesystem::path& final_path);
@@ -28,13 +30,15 @@ class StagedFile {
   [[nodiscard]] Status commit();
 
  private:
-  StagedFile(std::filesystem::path final_path, std::filesystem::path staging)
-      : final_(std::move(final_path)), staging_(std::move(staging)) {}
+  StagedFile(std::filesystem::path final_path, std::filesystem::path staging, UniqueFd lock)
+      : final_(std::move(final_path)), staging_(std::move(staging)), lock_(std::move(lock)) {}
   std::filesystem::path final_;
-  std::filesystem::path staging_;
+  std::filesystem::path staging_;  // empty when there is nothing to remove
+  UniqueFd lock_;                  // of what is staged: says that its owner lives
 };
 
-/// The same for a folder of files. commit() replaces an older folder of that name.
+/// The same for a folder of files. commit() replaces an older folder of that name; where the file
+/// system can exchange two names, one of both stands there at any time.
 class StagedFolder {
  public:
   [[nodiscard]] static Result<StagedFolder> create(const std::filesystem::path& final_path);
@@ -45,10 +49,11 @@ class StagedFolder {
   [[nodiscard]] Status commit();
 
  private:
-  StagedFolder(std::filesystem::path final_path, std::filesystem::path staging)
-      : final_(std::move(final_path)), staging_(std::move(staging)) {}
+  StagedFolder(std::filesystem::path final_path, std::filesystem::path staging, UniqueFd lock)
+      : final_(std::move(final_path)), staging_(std::move(staging)), lock_(std::move(lock)) {}
   std::filesystem::path final_;
-  std::filesystem::path staging_;
+  std::filesystem::path staging_;  // empty when there is nothing to remove
+  UniqueFd lock_;                  // of what is staged: says that its owner lives
 };
 
 }  // namespace veneer

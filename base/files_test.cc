@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
 #include <fstream>
+#include <thread>
 
 #include "base/testing/temporary_folder.h"
 
@@ -64,6 +67,65 @@ TEST(StagedFolder, ReplacesTheOldOneWhole) {
   EXPECT_FALSE(fs::exists(final_path / "old.csv"));
   EXPECT_EQ(read_text(final_path / "new.csv").value(), "new");
   EXPECT_EQ(entries(folder.path()), 1U);
+}
+
+TEST(StagedFolder, IsNeverAbsentWhileItIsReplaced) {
+  const TemporaryFolder folder;
+  const fs::path final_path = folder.path() / "set";
+  fs::create_directories(final_path);
+  std::atomic<bool> stop{false};
+  std::atomic<int> absent{0};
+  std::thread reader([&] {
+    while (!stop) {
+      if (!fs::exists(final_path)) ++absent;
+    }
+  });
+  for (int i = 0; i < 100; ++i) {
+    auto staged = StagedFolder::create(final_path);
+    EXPECT_TRUE(staged && staged->commit());
+  }
+  stop = true;
+  reader.join();
+  EXPECT_EQ(absent, 0);
+  EXPECT_EQ(entries(folder.path()), 1U);
+}
+
+TEST(StagedFolder, KeepsTheOldOneWhereTheStagedOneIsGone) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(write_text(folder.path() / "set" / "old.csv", "old"));
+  auto staged = StagedFolder::create(folder.path() / "set");
+  ASSERT_TRUE(staged);
+  fs::remove_all(staged->path());
+  const Status status = staged->commit();
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, Errc::kIo);
+  EXPECT_EQ(read_text(folder.path() / "set" / "old.csv").value(), "old");
+}
+
+TEST(StagedFolder, RemovesWhatKilledProgramsLeft) {
+  const TemporaryFolder folder;
+  const auto hour_ago = fs::file_time_type::clock::now() - std::chrono::hours(1);
+  const fs::path stale = folder.path() / ".set.veneer-aBc123";
+  ASSERT_TRUE(write_text(stale / "half.csv", "half"));
+  const fs::path stale_file = folder.path() / ".set.veneer-dEf456";
+  ASSERT_TRUE(write_text(stale_file, "half"));
+  const fs::path young = folder.path() / ".set.veneer-gHi789";
+  ASSERT_TRUE(write_text(young / "half.csv", "half"));
+  const fs::path foreign = folder.path() / ".set.backup";
+  ASSERT_TRUE(write_text(foreign, "precious"));
+  auto busy = StagedFolder::create(folder.path() / "set");
+  ASSERT_TRUE(busy);
+  for (const fs::path& old : {stale, stale_file, foreign, busy->path()})
+    fs::last_write_time(old, hour_ago);
+  const auto staged = StagedFolder::create(folder.path() / "set");
+  ASSERT_TRUE(staged);
+  EXPECT_FALSE(fs::exists(stale));
+  EXPECT_FALSE(fs::exists(stale_file));
+  EXPECT_TRUE(fs::exists(young)) << "it may not be locked yet";
+  EXPECT_TRUE(fs::exists(foreign));
+  EXPECT_TRUE(fs::exists(busy->path())) << "its owner lives";
+  ASSERT_TRUE(busy->commit());
+  EXPECT_TRUE(fs::is_directory(folder.path() / "set"));
 }
 
 TEST(StagedFolder, TakesATrailingSlash) {
