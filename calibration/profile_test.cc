@@ -5,12 +5,14 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <unistd.h>
+#include <zlib.h>
 
 #include <cmath>
 #include <filesystem>
 #include <functional>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "base/files.h"
 
@@ -188,6 +190,20 @@ TEST_F(ProfileTest, ANewerVersionIsRefusedAsNewer) {
         1;  // so the checksum differs too, but that is not the reason
   });
   expect_refused("newer");
+}
+
+TEST_F(ProfileTest, OneFromBeforeSurfacesHadMapsIsRead) {
+  ASSERT_TRUE(example_profile().save(folder_));
+  edit_json([](nlohmann::json& json) {
+    json["version"] = 1;
+    json["profile"].erase("has_surface_map");
+    const std::string text = json["profile"].dump();
+    const auto crc = crc32_z(0, reinterpret_cast<const Bytef*>(text.data()), text.size());
+    json["checksum"] = fmt::format("crc32:{:08x}", crc);
+  });
+  const auto loaded = ProjectorProfile::load(folder_);
+  ASSERT_TRUE(loaded) << loaded.error().what;
+  EXPECT_TRUE(loaded->surface_map.empty());
 }
 
 TEST_F(ProfileTest, AChangedNumberIsRefused) {
