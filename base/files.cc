@@ -230,7 +230,7 @@ Status StagedFolder::commit() {
         Errc::kIo, "writing the folder {}: a file of that name is in the way", target.string());
   }
   VENEER_TRY(exchange_folders(staging_, target));
-  const Status status = sync_parent(target);
+  Status status = sync_parent(target);
   fs::remove_all(staging_, error);  // the old one; only after the new one is sure to stay
   staging_.clear();
   lock_.reset();
