@@ -19,6 +19,9 @@ namespace {
 
 // Rows that are in memory at a time, as float: 40 MB of a Bonn set.
 constexpr int kBlockRows = 512;
+// Rows that are assigned to clusters at a time: 64 MB of weights at the most clusters and
+// components, 2 MB at the usual ones.
+constexpr Eigen::Index kAssignedRows = 4096;
 constexpr int kPowerIterations = 2;
 // Extra directions that are carried along while eigenvectors are refined, so that the last wanted
 // one converges too (Halko et al. 2011, section 4.3, suggest 5 to 10).
@@ -85,15 +88,14 @@ void orthonormalise_rows(RowMatrix& rows) {
 
 // The data in few columns: coordinates = rows * basis^T for each part.
 struct Projection {
-  std::vector<RowMatrix> basis;  // per part, [dimension][column], orthonormal rows
-  std::vector<Range> ranges;     // of each part's coordinates
-  RowMatrix coordinates;         // [row][sum of dimensions]
+  // Per part, [dimension][column], orthonormal rows; none where the columns are kept as they are.
+  std::vector<RowMatrix> basis;
+  std::vector<Range> ranges;  // of each part's coordinates
+  RowMatrix coordinates;      // [row][sum of dimensions]
 };
 
 Projection keep_all_columns(const RowSource& source, std::span<const int> rows) {
   Projection projection;
-  for (const int columns : source.part_columns)
-    projection.basis.push_back(RowMatrix::Identity(columns, columns));
   projection.ranges = ranges_of(source.part_columns);
   projection.coordinates.resize(source.rows, source.columns());
   read_rows(source, rows, projection.coordinates);
@@ -262,7 +264,7 @@ class Lloyd {
 
   /// The best of several starts, which end up to a tenth apart in squared error, improved by swaps.
   std::vector<int> run(Progress& progress, int& iterations) {
-    progress.start("clusters", kStarts + kSwaps);
+    progress.start("clusters", kStarts + (clusters_ > 1 ? kSwaps : 0));
     Pcg32 random(options_.seed, 2);
     std::vector<int> best;
     double least = std::numeric_limits<double>::infinity();
@@ -277,7 +279,7 @@ class Lloyd {
       }
       progress.advance();
     }
-    for (int trial = 0; trial < kSwaps && least > 0.0; ++trial) {
+    for (int trial = 0; trial < kSwaps && clusters_ > 1 && least > 0.0; ++trial) {
       std::vector<int> cluster = best;
       int done = 0;
       swap_cluster(cluster, random);
@@ -368,26 +370,32 @@ class Lloyd {
   // Moves every row to the cluster that keeps most of its energy; returns the squared error.
   double assign(std::vector<int>& cluster) {
     const auto rows = projection_.coordinates.rows();
+    for (Eigen::Index first = 0; first < rows; first += kAssignedRows)
+      assign_rows(first, std::min<Eigen::Index>(kAssignedRows, rows - first), cluster);
+    const double error = std::accumulate(errors_.begin(), errors_.end(), 0.0);
+    refill_empty_clusters(cluster, errors_, clusters_);
+    return error;
+  }
+
+  void assign_rows(Eigen::Index first, Eigen::Index rows, std::vector<int>& cluster) {
     RowMatrix kept = RowMatrix::Zero(rows, clusters_);
     for (std::size_t p = 0; p < directions_.size(); ++p) {
       const Range& range = projection_.ranges[p];
       const int count = options_.components[p];
       RowMatrix weights(rows, directions_[p].rows());
-      product_transposed(
-          projection_.coordinates.middleCols(range.first, range.count), directions_[p], weights);
+      product_transposed(projection_.coordinates.block(first, range.first, rows, range.count),
+                         directions_[p],
+                         weights);
       for (int k = 0; k < clusters_; ++k)
         kept.col(k) += weights.middleCols(k * count, count).rowwise().squaredNorm();
     }
-    double error = 0.0;
     for (Eigen::Index row = 0; row < rows; ++row) {
       int best = 0;
       const float energy = kept.row(row).maxCoeff(&best);
-      cluster[static_cast<std::size_t>(row)] = best;
-      errors_[static_cast<std::size_t>(row)] = std::max(0.0, double(norms_[row]) - double(energy));
-      error += errors_[static_cast<std::size_t>(row)];
+      const auto index = static_cast<std::size_t>(first + row);
+      cluster[index] = best;
+      errors_[index] = std::max(0.0, double(norms_[first + row]) - double(energy));
     }
-    refill_empty_clusters(cluster, errors_, clusters_);
-    return error;
   }
 
   const Projection& projection_;
@@ -455,7 +463,10 @@ LocalPca fit_local_pca(const RowSource& source,
                             .segment(range.first, range.count);
       const int carried = std::min({components[p].count + kOversampling, size, range.count});
       parts[p].vectors.resize(carried, columns[p].count);
-      product(leading_directions(points, carried), projection.basis[p], parts[p].vectors);
+      if (projection.basis.empty())
+        parts[p].vectors = leading_directions(points, carried);
+      else
+        product(leading_directions(points, carried), projection.basis[p], parts[p].vectors);
       parts[p].weights.resize(size, carried);
     }
 

@@ -32,7 +32,7 @@ struct LocalPcaOptions {
   /// Columns of the randomised basis (for each part) in which clusters are found; 0 keeps the data
   /// as they are, which must then fit into memory.
   int basis = 160;
-  int iterations = 60;  ///< of Lloyd's algorithm, at most
+  int iterations = 60;  ///< of Lloyd's algorithm at most, from each start and after each swap
   std::uint64_t seed = 1;
 };
 
@@ -44,17 +44,17 @@ struct LocalPca {
   RowMatrix weights;                    ///< [row][component], the parts' components in turn
   std::vector<RowMatrix> eigenvectors;  ///< per part, [cluster * components][column], orthonormal
   double unexplained = 0.0;             ///< squared error over squared values, 0 for zero data
-  int iterations = 0;                   ///< of Lloyd's algorithm that were done
+  int iterations = 0;                   ///< Lloyd's, of the start and the swaps that were kept
 };
 
 /// Fits by alternating assignment and principal components, from a k-means start.
 ///
 /// Clusters are found in a randomised orthonormal basis of the rows, which keeps the distances that
 /// matter; the eigenvectors are then refined, and the weights projected, in the full space. Memory:
-/// rows * basis floats and one cluster's eigenvectors, whatever the number of columns.
-/// Deterministic for a seed. Defined for any finite data: eigenvectors beyond a cluster's rank are
-/// zero, and so are those of clusters that stay empty because there are fewer different rows than
-/// clusters.
+/// a few times (rows + columns) * basis floats for each part and blocks of some thousand rows, never
+/// all rows at all columns, but for basis 0. The same for a seed on one machine, whatever the number
+/// of threads. Defined for any finite data: eigenvectors beyond a cluster's rank are zero, and so
+/// are those of clusters that stay empty because there are fewer different rows than clusters.
 ///
 /// Sources: Kambhatla and Leen 1997, "Dimension Reduction by Local Principal Component Analysis";
 /// Mueller, Meseth, Klein 2003, "Compression and Real-Time Rendering of Measured BTFs Using Local

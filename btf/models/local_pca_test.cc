@@ -6,8 +6,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
 #include <set>
+#include <string>
 
 #include "base/random.h"
 
@@ -143,6 +150,38 @@ TEST(LocalPca, IsTheSameForTheSameSeed) {
   EXPECT_EQ(a.cluster, b.cluster);
   EXPECT_EQ(a.weights, b.weights);
   EXPECT_EQ(a.eigenvectors[0], b.eigenvectors[0]);
+}
+
+// For the test below, which runs this one in processes of its own: the number of threads is settled
+// when it is first asked for. Large enough for several blocks of every product.
+TEST(LocalPca, DISABLED_PrintsItsResult) {
+  const RowMatrix data = random_matrix(700, 300, 21) * random_matrix(300, 2500, 22);
+  const LocalPca pca = fit(data, {.clusters = 5, .components = {3}, .iterations = 5});
+  std::uint64_t hash = 0;
+  for (const float value : pca.weights.reshaped())
+    hash = hash * 1099511628211U + std::bit_cast<std::uint32_t>(value);
+  std::cout << "result " << hash << std::endl;
+}
+
+TEST(LocalPca, IsTheSameForAnyNumberOfThreads) {
+  const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
+  std::set<std::string> results;
+  for (const int threads : {1, 2, 3}) {
+    const std::string command = fmt::format(
+        "VENEER_THREADS={0} OPENBLAS_NUM_THREADS={0} '{1}' --gtest_also_run_disabled_tests "
+        "--gtest_filter=LocalPca.DISABLED_PrintsItsResult",
+        threads,
+        program);
+    const std::unique_ptr<FILE, int (*)(FILE*)> output(popen(command.c_str(), "r"), &pclose);
+    ASSERT_TRUE(output);
+    std::array<char, 256> line{};
+    std::string result;
+    while (std::fgets(line.data(), line.size(), output.get()) != nullptr)
+      if (std::string_view(line.data()).starts_with("result ")) result = line.data();
+    ASSERT_FALSE(result.empty()) << command;
+    results.insert(result);
+  }
+  EXPECT_EQ(results.size(), 1U);
 }
 
 TEST(LocalPca, IsDefinedAtTheEdges) {

@@ -3,10 +3,19 @@
 
 #include <cblas.h>
 
+#include <algorithm>
+
+#include "base/parallel.h"
 #include "base/result.h"
 
 namespace veneer::btf {
 namespace {
+
+// Blocks of the result, each one product of one thread: the order in which sums are rounded does
+// not depend on how many threads there are. Small enough for many cores, large enough that a
+// block's operands are read into the cache for some use.
+constexpr Eigen::Index kBlockRows = 64;
+constexpr Eigen::Index kBlockColumns = 1024;
 
 // out = op(a) * op(b) + beta * out. An empty product is zero, which BLAS does not promise to write.
 void gemm(CBLAS_TRANSPOSE op_a,
@@ -21,20 +30,30 @@ void gemm(CBLAS_TRANSPOSE op_a,
     out *= beta;
     return;
   }
-  cblas_sgemm(CblasRowMajor,
-              op_a,
-              op_b,
-              static_cast<int>(out.rows()),
-              static_cast<int>(out.cols()),
-              static_cast<int>(inner),
-              1.0F,
-              a.data(),
-              static_cast<int>(a.outerStride()),
-              b.data(),
-              static_cast<int>(b.outerStride()),
-              beta,
-              out.data(),
-              static_cast<int>(out.outerStride()));
+  static const bool kOneThread = (openblas_set_num_threads(1), true);
+  VENEER_CHECK(kOneThread);
+  const Eigen::Index across = (out.cols() + kBlockColumns - 1) / kBlockColumns;
+  const Eigen::Index down = (out.rows() + kBlockRows - 1) / kBlockRows;
+  parallel_for(across * down, 1, [&](std::int64_t begin, std::int64_t end) {
+    for (std::int64_t block = begin; block < end; ++block) {
+      const Eigen::Index row = block / across * kBlockRows;
+      const Eigen::Index column = block % across * kBlockColumns;
+      cblas_sgemm(CblasRowMajor,
+                  op_a,
+                  op_b,
+                  static_cast<int>(std::min(kBlockRows, out.rows() - row)),
+                  static_cast<int>(std::min(kBlockColumns, out.cols() - column)),
+                  static_cast<int>(inner),
+                  1.0F,
+                  a.data() + row * (op_a == CblasNoTrans ? a.outerStride() : 1),
+                  static_cast<int>(a.outerStride()),
+                  b.data() + column * (op_b == CblasNoTrans ? 1 : b.outerStride()),
+                  static_cast<int>(b.outerStride()),
+                  beta,
+                  out.data() + row * out.outerStride() + column,
+                  static_cast<int>(out.outerStride()));
+    }
+  });
 }
 
 }  // namespace

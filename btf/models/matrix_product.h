@@ -13,8 +13,10 @@ using RowMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 using RowBlock = Eigen::Ref<const RowMatrix, 0, Eigen::OuterStride<>>;
 using MutableRowBlock = Eigen::Ref<RowMatrix, 0, Eigen::OuterStride<>>;
 
-/// Products of large matrices through BLAS, six times faster than Eigen's own on two cores. Not to
-/// be called inside parallel_for: BLAS brings its own threads.
+/// Products of large matrices through BLAS, six times faster than Eigen's own on two cores. They
+/// spread themselves by parallel_for, so they are not to be called inside one. Each block of a
+/// result is made by one thread, so on one machine results do not depend on the number of threads;
+/// BLAS's own threads are switched off for the whole process.
 /// out = a * b.
 void product(const RowBlock& a, const RowBlock& b, MutableRowBlock out);
 /// out = a * b^T.
