@@ -8,7 +8,9 @@
 
 namespace veneer::cli {
 
-CommandLine::CommandLine(std::string name, std::string summary, std::vector<std::string> arguments)
+CommandLine::CommandLine(const std::string& name,
+                         std::string summary,
+                         std::vector<std::string> arguments)
     : app_(std::move(summary), "veneer " + name), arguments_(std::move(arguments)) {
   app_.add_flag("--json", json_, "Print one JSON object on standard output and nothing else there");
   app_.add_flag("--quiet", quiet_, "Show no progress");

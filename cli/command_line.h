@@ -16,7 +16,7 @@ namespace veneer::cli {
 /// What every command has in common: its arguments, --json, --quiet, progress and the result.
 class CommandLine {
  public:
-  CommandLine(std::string name, std::string summary, std::vector<std::string> arguments);
+  CommandLine(const std::string& name, std::string summary, std::vector<std::string> arguments);
 
   /// Where a command declares its options, before parse().
   [[nodiscard]] CLI::App& app() { return app_; }

@@ -2,6 +2,7 @@
 // veneer: every tool around the daemon.
 #include <algorithm>
 #include <array>
+#include <new>
 #include <string_view>
 
 #include "base/exit_code.h"
@@ -69,6 +70,11 @@ int main(int argc, char** argv) {
     if (exit_code) return *exit_code;
     fmt::print(stderr, "veneer {}: {}\n", command->name, exit_code.error().what);
     return exit_code_of(exit_code.error());
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr,
+               "veneer {}: there is not enough memory; close other programs, or crop the data\n",
+               command->name);
+    return kExitFailed;
   } catch (const CLI::ParseError& error) {
     return line.app().exit(error) == 0 ? kExitDone : kExitUsage;
   }

@@ -28,6 +28,7 @@ Result<Config> Config::read(TomlReader& toml) {
   read_path(toml, "profile", config.profile, true);
   read_path(toml, "summary", config.summary, false);
   read_path(toml, "frame_log", config.frame_log, false);
+  read_path(toml, "record", config.record, false);
 
   std::string clock = "monotonic";
   toml.read("clock", clock);

@@ -31,6 +31,7 @@ struct Config {
   /// How long to wait for the first pose before giving up. > 0.
   double first_pose_timeout_s = 5;
   std::filesystem::path summary;    ///< JSON written at the end; none where empty
+  std::filesystem::path record;     ///< poses as they come, for the replay driver; none where empty
   std::filesystem::path frame_log;  ///< CSV, a line a frame; none where empty
   render::RendererOptions render;
   tracking::PredictionOptions prediction;

@@ -8,6 +8,7 @@
 #include "btf/material.h"
 #include "calibration/profile.h"
 #include "daemon/config.h"
+#include "daemon/recording_tracker.h"
 #include "projector/outputs.h"
 #include "tracking/drivers.h"
 
@@ -30,12 +31,16 @@ Result<Summary> run(const std::filesystem::path& config_path,
   }
   TomlReader tracker_table = toml.table("tracker");
   const Time tracker_start = clock->now();
-  VENEER_ASSIGN(const std::unique_ptr<tracking::Tracker> tracker,
+  VENEER_ASSIGN(std::unique_ptr<tracking::Tracker> tracker,
                 tracking::open_tracker(tracker_table, *clock));
   TomlReader output_table = toml.table("output");
   VENEER_ASSIGN(const std::unique_ptr<projector::Output> output,
                 projector::open_output(output_table));
   VENEER_TRY(toml.finish());
+  if (!config.record.empty()) {
+    VENEER_ASSIGN(tracking::PoseRecorder recorder, tracking::PoseRecorder::create(config.record));
+    tracker = std::make_unique<RecordingTracker>(std::move(tracker), std::move(recorder));
+  }
 
   VENEER_ASSIGN(const render::Scene scene, render::Scene::load(config.scene));
   VENEER_ASSIGN(const std::unique_ptr<btf::Material> material, btf::load_material(config.material));
@@ -63,6 +68,11 @@ Result<Summary> run(const std::filesystem::path& config_path,
   summary.renderer = renderer->description();
   summary.tracker = tracker->description();
   summary.output = output->description();
+  summary.tracker_lost = poses.lost();
+  summary.output_waits = output->waits();
+  summary.clock = config.clock == ClockKind::kVirtual ? "virtual" : "monotonic";
+  summary.settings = settings;
+  summary.bits = profile.bits;
   summary.tracker_start = tracker_start;
   if (!config.summary.empty()) VENEER_TRY(write_summary(summary, config.summary));
   if (!config.frame_log.empty()) VENEER_TRY(write_frame_log(record, config.frame_log));

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/frame_loop.h"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -30,10 +32,9 @@ FrameLoop::FrameLoop(const Config& config,
       clock_(clock),
       poses_(poses),
       renderer_(renderer),
-      output_(output) {
-  if (output.wants_pixels()) codes_ = Image<Rgb16>(raster.width, raster.height);
-  if (output.wants_target()) target_ = Image<Rgb32f>(raster.width, raster.height);
-}
+      output_(output),
+      codes_(raster.width, raster.height),
+      target_(raster.width, raster.height) {}
 
 Status FrameLoop::wait_for_first_pose(const std::atomic<bool>& stop) {
   constexpr Duration kStep = std::chrono::milliseconds(5);
@@ -78,11 +79,11 @@ Result<FrameRecord> FrameLoop::make_frame(std::uint64_t number, Time start) {
   frame.number = number;
   frame.bits = raster_.bits;
   frame.display_time = record.display_time;
-  if (!codes_.empty()) {
+  if (output_.wants_pixels(number)) {
     renderer_.read_codes(codes_.view());
     frame.codes = codes_.view();
   }
-  if (!target_.empty()) {
+  if (output_.wants_target(number)) {
     renderer_.read_target(target_.view());
     frame.target_xyz = target_.view();
   }
@@ -110,6 +111,11 @@ Result<RunRecord> FrameLoop::run(const std::atomic<bool>& stop, Progress& progre
     } else {
       run.frames[number % kRememberedFrames] = record;
     }
+    if (record.origin == tracking::PoseOrigin::kHeld) ++run.held;
+    if (!tracker_lost_ && poses_.lost()) {
+      tracker_lost_ = true;
+      spdlog::warn("{}; the picture stays as for the last pose", poses_.health().error().what);
+    }
     if (record.frame_ms > 1e3 * to_seconds(period)) ++run.late;
     // The next frame starts on the next period that has not begun yet; those in between are lost.
     start += period;
@@ -121,13 +127,13 @@ Result<RunRecord> FrameLoop::run(const std::atomic<bool>& stop, Progress& progre
     if (config_.frames > 0) progress.advance(1);
   }
   if (config_.frames > 0) progress.finish({});
+  run.seconds = milliseconds_since(begin) * 1e-3;
   if (run.count > kRememberedFrames) {
     std::ranges::rotate(
         run.frames,
         run.frames.begin() + static_cast<std::ptrdiff_t>(run.count % kRememberedFrames));
   }
   VENEER_TRY(output_.finish());
-  run.seconds = milliseconds_since(begin) * 1e-3;
   return run;
 }
 

@@ -38,7 +38,8 @@ struct RunRecord {
   std::uint64_t count = 0;          ///< all
   std::uint64_t dropped = 0;        ///< display periods for which no frame was ready
   std::uint64_t late = 0;           ///< frames that took longer than a period to make
-  double seconds = 0;               ///< real time from the first frame to the last
+  double seconds = 0;               ///< real time from the first frame to the last handed over
+  std::uint64_t held = 0;  ///< frames drawn for a pose that was held, not measured or predicted
 };
 
 /// The projector's raster.
@@ -75,8 +76,9 @@ class FrameLoop {
   PoseFeed& poses_;
   render::Renderer& renderer_;
   projector::Output& output_;
-  Image<Rgb16> codes_;    // empty where the output wants no pixels
-  Image<Rgb32f> target_;  // empty where the output wants no target
+  Image<Rgb16> codes_;
+  Image<Rgb32f> target_;
+  bool tracker_lost_ = false;  // and said so
 };
 
 }  // namespace veneer::daemon

@@ -51,7 +51,7 @@ class RecordingRenderer final : public render::Renderer {
 class CountingOutput final : public projector::Output {
  public:
   std::string description() const override { return "counting"; }
-  bool wants_pixels() const override { return true; }
+  bool wants_pixels(std::uint64_t) const override { return true; }
   Status present(const projector::Frame& frame) override {
     if (fail_at && frame.number == *fail_at) return fail(Errc::kIo, "the disk is full");
     EXPECT_EQ(frame.codes(0, 0), (Rgb16{7, 8, 9}));
@@ -135,6 +135,7 @@ TEST_F(FrameLoopTest, GoesOnWithTheLastPoseWhenTheTrackerGoes) {
   const RunRecord record = run(Time{1ms}, Time{100ms}).value();
   EXPECT_EQ(record.count, 20U);
   EXPECT_EQ(record.frames.back().origin, tracking::PoseOrigin::kHeld);
+  EXPECT_GT(record.held, 0U);
   EXPECT_TRUE(renderer_.inputs.back().eye_in_world.allFinite());
 }
 
@@ -157,7 +158,7 @@ TEST_F(FrameLoopTest, CountsTheFramesItLosesInRealTime) {
   class SlowOutput final : public projector::Output {
    public:
     std::string description() const override { return "slow"; }
-    bool wants_pixels() const override { return false; }
+    bool wants_pixels(std::uint64_t) const override { return false; }
     Status present(const projector::Frame& frame) override {
       if (frame.number == 2) std::this_thread::sleep_for(50ms);
       return {};

@@ -33,18 +33,24 @@ bool PoseFeed::read_one(Duration timeout) {
     if (sample.error().code == Errc::kTimeout) return true;
     const std::scoped_lock lock(health_mutex_);
     health_ = fail_while("reading the tracker", sample.error());
+    lost_ = true;
     return false;
   }
   const auto found = std::ranges::find(
       tracks_, sample->body, [](const std::unique_ptr<BodyTrack>& track) { return track->body; });
   if (found == tracks_.end()) return true;
-  if ((*found)->track.add(*sample) != tracking::PoseTrack::Verdict::kTaken) ++rejected_;
+  // A stamp far ahead would make all that follow late: the eye would stand still until then.
+  constexpr Duration kClockTolerance = 100ms;
+  if (sample->time > clock_.now() + kClockTolerance ||
+      (*found)->track.add(*sample) != tracking::PoseTrack::Verdict::kTaken) {
+    ++rejected_;
+  }
   return true;
 }
 
 void PoseFeed::advance_to(Time when) {
   if (!reader_.joinable()) {
-    while (!gone_ && clock_.now() < when) gone_ = !read_one(when - clock_.now());
+    while (!lost_ && clock_.now() < when) read_one(when - clock_.now());
   }
   clock_.sleep_until(when);
 }

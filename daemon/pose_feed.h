@@ -32,9 +32,11 @@ class PoseFeed {
   void advance_to(Time when);
   /// Where the body will be at `when`; kNone before its first sample. Never waits.
   [[nodiscard]] tracking::PoseEstimate at(tracking::BodyId body, Time when) const;
-  /// Whether the tracker has gone for good, and why.
+  /// Whether the tracker has gone for good. Never waits.
+  [[nodiscard]] bool lost() const { return lost_; }
+  /// The same, and why.
   [[nodiscard]] Status health() const;
-  /// Samples that were not taken: duplicate, late or invalid.
+  /// Samples that were not taken: duplicate, late, invalid or of a time yet to come.
   [[nodiscard]] std::uint64_t rejected() const { return rejected_; }
 
  private:
@@ -53,7 +55,7 @@ class PoseFeed {
   std::atomic<std::uint64_t> rejected_{0};
   mutable std::mutex health_mutex_;
   Status health_;
-  bool gone_ = false;    // virtual clock only
+  std::atomic<bool> lost_{false};
   std::jthread reader_;  // last: it stops before what it uses goes
 };
 

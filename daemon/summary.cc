@@ -35,6 +35,7 @@ Summary summarise(const RunRecord& run) {
   summary.pose_age_ms_p99 = quantile(pose_age_ms, 0.99);
   summary.dropped = run.dropped;
   summary.late = run.late;
+  summary.held = run.held;
   return summary;
 }
 
@@ -64,13 +65,19 @@ Status write_summary(const Summary& summary, const std::filesystem::path& path) 
       {"pose_age_ms_p99", summary.pose_age_ms_p99},
       {"dropped_frames", summary.dropped},
       {"late_frames", summary.late},
+      {"held_frames", summary.held},
       {"rejected_poses", summary.rejected_poses},
+      {"tracker_lost", summary.tracker_lost},
+      {"output_waits", summary.output_waits},
       {"out_of_gamut", summary.out_of_gamut},
       {"out_of_reach", summary.out_of_reach},
       {"gamut_loss_mean", summary.gamut_loss_mean},
       {"renderer", summary.renderer},
       {"tracker", summary.tracker},
       {"output", summary.output},
+      {"clock", summary.clock},
+      {"settings", summary.settings},
+      {"bits", summary.bits},
       {"tracker_start_ns", summary.tracker_start.time_since_epoch().count()},
   };
   return write_text(path, json.dump(2) + "\n");

@@ -19,14 +19,20 @@ struct Summary {
   double pose_age_ms_p99 = 0;
   std::uint64_t dropped = 0;
   std::uint64_t late = 0;
+  std::uint64_t held = 0;  ///< frames drawn for a pose that was only held
   std::uint64_t rejected_poses = 0;
-  double out_of_gamut = 0;     ///< fraction of the covered pixels, over all frames
-  double out_of_reach = 0;     ///< likewise, too dark for the projector's angle
-  double gamut_loss_mean = 0;  ///< FrameStatistics::gamut_loss_mean over all frames
+  bool tracker_lost = false;
+  std::uint64_t output_waits = 0;  ///< how often a frame had to wait for the output
+  double out_of_gamut = 0;         ///< fraction of the covered pixels, over all frames
+  double out_of_reach = 0;         ///< likewise, too dark for the projector's angle
+  double gamut_loss_mean = 0;      ///< FrameStatistics::gamut_loss_mean over all frames
   std::string renderer;
   std::string tracker;
   std::string output;
-  Time tracker_start;  ///< time zero of a simulated tracker's paths
+  std::string clock;                  ///< "monotonic" or "virtual"
+  std::vector<std::string> settings;  ///< that replaced values of the configuration
+  int bits = 0;                       ///< of a drive code
+  Time tracker_start;                 ///< time zero of a simulated tracker's paths
 };
 
 [[nodiscard]] Summary summarise(const RunRecord& run);

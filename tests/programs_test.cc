@@ -170,6 +170,28 @@ TEST_F(ProgramsTest, SamplesThatAreNoNumbersAreRefusedWithTheirPlace) {
   EXPECT_FALSE(fs::exists(at("x")));
 }
 
+TEST_F(ProgramsTest, VerifyRefusesARunWithoutFramesAndOneOfAnotherMesh) {
+  const std::string config = text("veneer.toml");
+  ASSERT_EQ(run("veneerd --config " + config + " --set frames=1").exit_code, 0);
+  const std::string verify = "veneer verify --bench " VENEER_ETC "/benches/demo.toml --set " +
+                             text("cloth.btfset") + " --run " + folder_->path().string();
+  ASSERT_TRUE(write_text(at("frames") / "frames.jsonl", ""));
+  EXPECT_TRUE(fails(run(verify), 1, "no frames"));
+  std::string scene = read_text(at("scene.toml")).value();
+  scene.replace(scene.find("\"sphere\""), 8, "\"vase\"");
+  ASSERT_TRUE(write_text(at("vase.toml"), scene));
+  ASSERT_EQ(
+      run("veneerd --config " + config + " --set frames=1 --set 'scene=\"vase.toml\"'").exit_code,
+      0);
+  EXPECT_TRUE(fails(run(verify), 2, "vase"));
+}
+
+TEST_F(ProgramsTest, TheDemoLeavesAForeignFolderAlone) {
+  ASSERT_TRUE(write_text(at("mine") / "pictures" / "holiday.png", "precious"));
+  EXPECT_TRUE(fails(run("veneer demo --out " + text("mine")), 2, "name another folder"));
+  EXPECT_TRUE(fs::exists(at("mine") / "pictures" / "holiday.png"));
+}
+
 TEST_F(ProgramsTest, AMeshWithoutTextureCoordinatesIsRefused) {
   ASSERT_TRUE(write_text(at("bare.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
   std::string scene = read_text(at("scene.toml")).value();
@@ -236,6 +258,22 @@ TEST_F(ProgramsTest, TheDaemonMakesTheSameFramesTwice) {
   for (int frame = 0; frame < 3; ++frame) {
     const std::string name = fmt::format("frame-{:06}.png", frame);
     EXPECT_EQ(read_text(at("first") / name).value(), read_text(at("second") / name).value())
+        << name;
+  }
+}
+
+TEST_F(ProgramsTest, AReplayedRecordingGivesTheSameFrames) {
+  const std::string run_it =
+      "veneerd --config " + text("veneer.toml") + " --set frames=3 --set 'output.folder=\"";
+  const Outcome live =
+      run(run_it + "live\"' --set tracker.latency_ms=0 --set 'record=\"poses.jsonl\"'");
+  ASSERT_EQ(live.exit_code, 0) << live.err;
+  const Outcome replayed =
+      run(run_it + "replayed\"' --set 'tracker={driver=\"replay\", file=\"poses.jsonl\"}'");
+  ASSERT_EQ(replayed.exit_code, 0) << replayed.err;
+  for (int frame = 0; frame < 3; ++frame) {
+    const std::string name = fmt::format("frame-{:06}.png", frame);
+    EXPECT_EQ(read_text(at("live") / name).value(), read_text(at("replayed") / name).value())
         << name;
   }
 }

@@ -20,7 +20,8 @@ namespace fs = std::filesystem;
 /// Removes the benchmark's sample set when it is done with.
 class ScratchFolder {
  public:
-  ScratchFolder() : path_(fs::temp_directory_path() / fmt::format("veneer-bench-{}", ::getpid())) {}
+  explicit ScratchFolder(const fs::path& parent)
+      : path_(parent / fmt::format("veneer-bench-{}", ::getpid())) {}
   ScratchFolder(const ScratchFolder&) = delete;
   ScratchFolder& operator=(const ScratchFolder&) = delete;
   ~ScratchFolder() {
@@ -50,7 +51,12 @@ constexpr std::array kCandidates{
 /// Every model at the sizes of the literature, fitted to a small synthetic cloth: what a pixel
 /// costs depends on sizes and access patterns, hardly on what the numbers are.
 Result<std::vector<render::RenderBenchMaterial>> fit_candidates(Progress& progress) {
-  const ScratchFolder scratch;
+  std::error_code error;
+  const fs::path temporary = fs::temp_directory_path(error);
+  if (error)
+    return fail(
+        Errc::kIo, "looking for a folder for temporary files: {}; set TMPDIR", error.message());
+  const ScratchFolder scratch(temporary);
   const fs::path path = scratch.path() / "cloth.btfset";
   VENEER_ASSIGN(const simulation::HeightFieldMaterial* cloth,
                 simulation::find_height_field_material("cloth"));

@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 
 /// Of every n-th frame pictures are made and colours compared.
 constexpr int kLookAtEvery = 5;
-/// Without compensation this part of the frames is enough.
+/// Where the frames of the run without compensation go.
 constexpr std::string_view kUncompensated = "frames-uncompensated";
 
 struct DemoOptions {
@@ -48,6 +48,7 @@ Status run_program(const std::string& name, std::vector<std::string> arguments) 
   const std::string path = (program_folder() / name).string();
   arguments.insert(arguments.begin(), path);
   std::vector<char*> argv;
+  argv.reserve(arguments.size() + 1);
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
   pid_t pid = 0;
@@ -65,11 +66,18 @@ Status run_program(const std::string& name, std::vector<std::string> arguments) 
   return {};
 }
 
+/// Whether `file` was made after this program was built: what an older one made may differ.
+bool is_up_to_date(const fs::path& file) {
+  std::error_code error;
+  const auto made = fs::last_write_time(file, error);
+  return !error && made > fs::last_write_time("/proc/self/exe");
+}
+
 /// The sample set that the demo shows: the user's, or cloth that is path-traced at the first run.
 Result<fs::path> sample_set(const DemoOptions& options, Progress& progress) {
   if (!options.set.empty()) return options.set;
   const fs::path set = options.out / "cloth.btfset";
-  if (btf::SampleSet::open(set)) return set;
+  if (is_up_to_date(set / "samples.safetensors") && btf::SampleSet::open(set)) return set;
   VENEER_ASSIGN(const simulation::HeightFieldMaterial* cloth,
                 simulation::find_height_field_material("cloth"));
   simulation::SynthesisOptions synthesis;
@@ -98,7 +106,8 @@ Status fit_material(const DemoOptions& options,
       const auto found = old->metadata().find(entry.first);
       return found != old->metadata().end() && found->second == entry.second;
     });
-    if (newer && alike && old->meta("model") == options.model && btf::load_material(material_path))
+    if (newer && alike && is_up_to_date(material_path) && old->meta("model") == options.model &&
+        btf::load_material(material_path))
       return {};
   }
   VENEER_ASSIGN(const std::unique_ptr<btf::Material> material,
@@ -122,9 +131,18 @@ Status measure_profile(const fs::path& bench_path,
   return measured.profile.save(profile_path);
 }
 
-/// Removes what an earlier run left, so that no old picture is taken for a new one.
+/// Removes what an earlier run left, so that no old picture is taken for a new one. A folder that
+/// is no demo's is left alone.
 Status clear_results(const fs::path& out) {
   std::error_code error;
+  if (fs::exists(out, error) && !fs::is_empty(out, error) &&
+      !fs::exists(out / "cloth.btfset", error) && !fs::exists(out / "veneer.toml", error) &&
+      !fs::exists(out / "material.safetensors", error)) {
+    return fail(
+        Errc::kInvalidOption,
+        "writing to {}: there are files in it that are not of an earlier demo; name another folder",
+        out.string());
+  }
   for (const char* name : {"frames",
                            "frames-uncompensated",
                            "pictures",
@@ -192,10 +210,10 @@ Result<int> run_demo(CommandLine& line) {
                     "frame_log=\"\""});
   VENEER_TRY(run_program("veneerd", arguments));
 
-  const RecordedRun run{out, "frames", std::string(kUncompensated)};
-  const VerificationOptions verification_options{bench, set, kLookAtEvery, out / "pictures"};
+  const VerificationOptions verification_options{
+      out, std::string(kUncompensated), bench, set, kLookAtEvery, out / "pictures"};
   VENEER_ASSIGN(const RunVerification verification,
-                verify_run(run, verification_options, line.progress()));
+                verify_run(verification_options, line.progress()));
   VENEER_ASSIGN(const std::string run_text, read_text(out / "run.json"));
   VENEER_ASSIGN(const render::Scene scene, render::Scene::load(out / "scene.toml"));
   const nlohmann::ordered_json report = report_json(

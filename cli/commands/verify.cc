@@ -47,14 +47,13 @@ Result<int> verify_patches(CommandLine& line,
 
 Result<int> run_verify(CommandLine& line) {
   VerificationOptions options;
-  RecordedRun run;
   fs::path profile;
   CLI::App& app = line.app();
   app.add_option("--bench", options.bench, "The virtual bench, bench.toml")->required();
   auto* profile_option =
       app.add_option("--profile", profile, "A profile to hold against readings of the bench");
   auto* run_option = app.add_option(
-      "--run", run.folder, "The folder of a run of veneerd, to be seen on the bench");
+      "--run", options.run, "The folder of a run of veneerd, to be seen on the bench");
   app.add_option("--set", options.set, "The sample set of its material")->needs(run_option);
   app.add_option("--every", options.every, "Look at every n-th recorded frame")
       ->capture_default_str();
@@ -62,12 +61,12 @@ Result<int> run_verify(CommandLine& line) {
   run_option->excludes(profile_option);
   line.parse();
   if (!profile.empty()) return verify_patches(line, options.bench, profile);
-  if (run.folder.empty() || options.set.empty()) {
+  if (options.run.empty() || options.set.empty()) {
     return fail(Errc::kInvalidOption,
                 "say what to verify: --profile PROFILE, or --run FOLDER with --set SET");
   }
 
-  VENEER_ASSIGN(const RunVerification result, verify_run(run, options, line.progress()));
+  VENEER_ASSIGN(const RunVerification result, verify_run(options, line.progress()));
   line.print({{"frames", result.frames.size()},
               {"de00_mean", result.within_gamut.mean},
               {"de00_p95", result.within_gamut.p95},

@@ -48,12 +48,12 @@ Image<Rgb8> picture_of_xyz(ImageView<const Rgb32f> xyz, double white_luminance) 
 }
 
 Image<Rgb8> picture_of_codes(ImageView<const Rgb16> codes, int bits) {
+  const double full = (1U << static_cast<unsigned>(bits)) - 1;
   Image<Rgb8> picture(codes.width(), codes.height());
   for (int y = 0; y < codes.height(); ++y) {
     for (int x = 0; x < codes.width(); ++x) {
       for (std::size_t c = 0; c < 3; ++c) {
-        picture(x, y)[c] =
-            static_cast<std::uint8_t>(codes(x, y)[c] >> static_cast<unsigned>(bits - 8));
+        picture(x, y)[c] = to_byte(codes(x, y)[c] / full);
       }
     }
   }

@@ -9,7 +9,7 @@ namespace veneer::cli {
 /// screen can show, encoded. @param xyz  cd/m^2.   @param white_luminance  shown as white; > 0.
 [[nodiscard]] Image<Rgb8> picture_of_xyz(ImageView<const Rgb32f> xyz, double white_luminance);
 
-/// Drive codes as they are, 8 bits of them. @param bits  of a code, 8 to 16.
+/// Drive codes as they are, spread over 8 bits. @param bits  of a code, 1 to 16.
 [[nodiscard]] Image<Rgb8> picture_of_codes(ImageView<const Rgb16> codes, int bits);
 
 /// Colour differences from dark blue (0) over green to yellow (`most` and above); pixels that are

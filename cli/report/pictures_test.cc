@@ -21,9 +21,13 @@ TEST(PictureOfXyz, ShowsTheWhiteAsWhiteAndCutsWhatIsBrighter) {
   EXPECT_EQ(picture(2, 0), (Rgb8{255, 255, 255}));
 }
 
-TEST(PictureOfCodes, KeepsTheHighestEightBits) {
-  const Image<Rgb16> codes(1, 1, Rgb16{1023, 512, 3});
-  EXPECT_EQ(picture_of_codes(codes.view(), 10)(0, 0), (Rgb8{255, 128, 0}));
+TEST(PictureOfCodes, SpreadsAnyDepthOverEightBits) {
+  const Image<Rgb16> ten(1, 1, Rgb16{1023, 514, 1});
+  EXPECT_EQ(picture_of_codes(ten.view(), 10)(0, 0), (Rgb8{255, 128, 0}));
+  const Image<Rgb16> eight(1, 1, Rgb16{255, 77, 0});
+  EXPECT_EQ(picture_of_codes(eight.view(), 8)(0, 0), (Rgb8{255, 77, 0}));
+  const Image<Rgb16> one(1, 1, Rgb16{1, 0, 1});
+  EXPECT_EQ(picture_of_codes(one.view(), 1)(0, 0), (Rgb8{255, 0, 255}));
 }
 
 TEST(PictureOfDifferences, GrowsLighterWithTheDifference) {

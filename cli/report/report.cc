@@ -78,7 +78,9 @@ ordered_json report_json(const json& run,
                           "pose_age_ms_p99",
                           "dropped_frames",
                           "late_frames",
-                          "out_of_gamut"}) {
+                          "clock",
+                          "out_of_gamut",
+                          "out_of_reach"}) {
     report[key] = run.at(key);
   }
   report["de00_mean"] = v.within_gamut.mean;
@@ -94,8 +96,8 @@ ordered_json report_json(const json& run,
   report["pixels_unlit"] = v.unlit;
   report["pixels_over_white"] = v.target_over_white;
   report["gates"] = {
-      {"de00_mean", v.within_gamut.mean <= gates.de00_mean},
-      {"de00_p95", v.within_gamut.p95 <= gates.de00_p95},
+      {"de00_mean", v.within_gamut.count > 0 && v.within_gamut.mean <= gates.de00_mean},
+      {"de00_p95", v.within_gamut.count > 0 && v.within_gamut.p95 <= gates.de00_p95},
       {"in_gamut", v.in_gamut_fraction >= gates.in_gamut},
       {"uncompensated_ratio",
        compared && v.uncompensated.mean >= gates.uncompensated_ratio * v.within_gamut.mean},

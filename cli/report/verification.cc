@@ -1,101 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/report/verification.h"
 
-#include <nlohmann/json.hpp>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <sstream>
 
-#include "base/clock.h"
-#include "base/files.h"
 #include "base/image_files.h"
 #include "base/statistics.h"
-#include "base/toml_reader.h"
 #include "btf/interpolated_set.h"
 #include "cli/report/pictures.h"
+#include "cli/report/recorded_run.h"
 #include "render/scene.h"
 #include "simulation/bench/material.h"
-#include "tracking/drivers/simulated/path.h"
 
 namespace veneer::cli {
 namespace {
 
 namespace fs = std::filesystem;
-using Eigen::Vector3d;
-using nlohmann::json;
 using simulation::Bench;
 using simulation::BenchLight;
-
-/// A frame that veneerd wrote.
-struct RecordedFrame {
-  std::uint64_t number = 0;
-  Duration display_time{};
-  fs::path file;
-};
-
-Result<std::vector<RecordedFrame>> read_frames(const fs::path& folder) {
-  VENEER_ASSIGN(const std::string text, read_text(folder / "frames.jsonl"));
-  std::vector<RecordedFrame> frames;
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) {
-    try {
-      const json entry = json::parse(line);
-      frames.push_back({entry.at("frame"),
-                        Duration{entry.at("display_time_ns").get<Duration::rep>()},
-                        folder / entry.at("file").get<std::string>()});
-    } catch (const json::exception& error) {
-      return fail(Errc::kBadFormat,
-                  "reading {}, line {}: {}",
-                  (folder / "frames.jsonl").string(),
-                  frames.size() + 1,
-                  error.what());
-    }
-  }
-  return frames;
-}
-
-/// Where the bodies of a simulated tracker truly were.
-class GroundTruth {
- public:
-  static Result<GroundTruth> read(const fs::path& run_folder) {
-    GroundTruth truth;
-    VENEER_ASSIGN(TomlReader toml, TomlReader::open(run_folder / "veneer.toml"));
-    TomlReader tracker = toml.table("tracker");
-    std::string driver;
-    tracker.read("driver", driver);
-    if (driver != "simulated") {
-      return fail(
-          Errc::kInvalidOption,
-          "verifying {}: only a run with the simulated tracker knows where the eye truly was",
-          run_folder.string());
-    }
-    for (TomlReader& table : tracker.tables("path")) {
-      VENEER_ASSIGN(tracking::Path path, tracking::Path::read(table));
-      truth.paths_.emplace(path.body(), path);
-    }
-    VENEER_ASSIGN(const std::string summary, read_text(run_folder / "run.json"));
-    const json parsed = json::parse(summary, nullptr, false);
-    if (!parsed.is_object() || !parsed.contains("tracker_start_ns")) {
-      return fail(Errc::kBadFormat,
-                  "reading {}: it is no summary of a run",
-                  (run_folder / "run.json").string());
-    }
-    truth.start_ = Duration{parsed["tracker_start_ns"].get<Duration::rep>()};
-    return truth;
-  }
-
-  /// A body that nobody scripted does not move.
-  [[nodiscard]] RigidTransform world_from_body(tracking::BodyId body, Duration when) const {
-    const auto found = paths_.find(body);
-    return found == paths_.end() ? RigidTransform{} : found->second.at(to_seconds(when - start_));
-  }
-
- private:
-  std::map<tracking::BodyId, tracking::Path> paths_;
-  Duration start_{};
-};
 
 std::vector<BenchLight> bench_lights(const std::vector<render::Light>& lights) {
   std::vector<BenchLight> result;
@@ -156,52 +79,77 @@ Image<Rgb8> difference_picture(const simulation::Comparison& comparison) {
   return picture_of_differences(de00.view(), kDifferenceScale);
 }
 
+/// Writes the pictures of one frame, or none.
 class PictureWriter {
  public:
   PictureWriter(fs::path folder, double white_luminance)
       : folder_(std::move(folder)), white_luminance_(white_luminance) {}
 
-  [[nodiscard]] Status write(std::string_view kind,
+  [[nodiscard]] Status codes(std::string_view kind,
                              std::uint64_t frame,
-                             const Image<Rgb8>& picture) const {
-    if (folder_.empty()) return {};
-    return write_png(folder_ / fmt::format("{}-{:06}.png", kind, frame), picture.view());
+                             const Image<Rgb16>& codes,
+                             int bits) const {
+    return folder_.empty() ? Status{} : write(kind, frame, picture_of_codes(codes.view(), bits));
   }
-  [[nodiscard]] Status write_xyz(std::string_view kind,
-                                 std::uint64_t frame,
-                                 const Image<Rgb32f>& xyz) const {
-    return write(kind, frame, picture_of_xyz(xyz.view(), white_luminance_));
+  [[nodiscard]] Status xyz(std::string_view kind,
+                           std::uint64_t frame,
+                           const Image<Rgb32f>& xyz) const {
+    return folder_.empty() ? Status{}
+                           : write(kind, frame, picture_of_xyz(xyz.view(), white_luminance_));
+  }
+  [[nodiscard]] Status difference(std::string_view kind,
+                                  std::uint64_t frame,
+                                  const simulation::Comparison& comparison) const {
+    return folder_.empty() ? Status{} : write(kind, frame, difference_picture(comparison));
   }
 
  private:
+  [[nodiscard]] Status write(std::string_view kind,
+                             std::uint64_t frame,
+                             const Image<Rgb8>& picture) const {
+    return write_png(folder_ / fmt::format("{}-{:06}.png", kind, frame), picture.view());
+  }
   fs::path folder_;
   double white_luminance_;
 };
 
 }  // namespace
 
-Result<RunVerification> verify_run(const RecordedRun& run,
-                                   const VerificationOptions& options,
-                                   Progress& progress) {
-  if (options.every < 1)
+Result<RunVerification> verify_run(const VerificationOptions& options, Progress& progress) {
+  if (options.every < 1) {
     return fail(Errc::kInvalidOption, "verifying: every {}-th frame makes no sense", options.every);
-  VENEER_ASSIGN(const render::Scene scene, render::Scene::load(run.folder / "scene.toml"));
-  VENEER_ASSIGN(const GroundTruth truth, GroundTruth::read(run.folder));
-  VENEER_ASSIGN(const std::vector<RecordedFrame> frames, read_frames(run.folder / run.frames));
-  VENEER_ASSIGN(const simulation::BenchTruth bench_truth,
-                simulation::BenchTruth::load(options.bench));
-  VENEER_ASSIGN(const std::unique_ptr<Bench> bench, Bench::create(bench_truth, scene.mesh));
+  }
+  VENEER_ASSIGN(const RecordedRun run, RecordedRun::open(options.run));
+  std::map<std::uint64_t, fs::path> uncompensated;
+  if (!options.uncompensated.empty()) {
+    VENEER_ASSIGN(const std::vector<RecordedFrame> frames, run.frames_in(options.uncompensated));
+    for (const RecordedFrame& frame : frames) uncompensated.emplace(frame.number, frame.file);
+  }
+  VENEER_ASSIGN(const render::Scene scene, render::Scene::load(run.scene()));
+  VENEER_ASSIGN(const std::unique_ptr<Bench> bench, Bench::load(options.bench));
+  const int bits = bench->truth().projector.bits;
+  if (bench->truth().object.mesh != scene.mesh_name || bits != run.bits()) {
+    return fail(Errc::kInvalidOption,
+                "verifying {}: the run is for the mesh \"{}\" and {} bits, the bench {} has \"{}\" "
+                "and {} bits",
+                options.run.string(),
+                scene.mesh_name,
+                run.bits(),
+                options.bench.string(),
+                bench->truth().object.mesh,
+                bits);
+  }
   VENEER_ASSIGN(btf::SampleSet set, btf::SampleSet::open(options.set));
   const btf::InterpolatedSet interpolated(std::move(set));
   const simulation::TexelSource material = simulation::texel_source(interpolated);
   const std::vector<BenchLight> lights = bench_lights(scene.lights);
   VENEER_ASSIGN(const Xyz white, bench->white(scene.world_from_object));
   const PictureWriter pictures(options.pictures, white.y());
-  const int bits = bench_truth.projector.bits;
 
   RunVerification result;
   Pool pool;
   Pool uncompensated_pool;
+  const std::vector<RecordedFrame>& frames = run.frames();
   const auto count = (static_cast<std::int64_t>(frames.size()) + options.every - 1) / options.every;
   progress.start("looking at frames on the virtual bench", count);
   for (std::size_t i = 0; i < frames.size(); i += static_cast<std::size_t>(options.every)) {
@@ -209,11 +157,11 @@ Result<RunVerification> verify_run(const RecordedRun& run,
     VerifiedFrame verified;
     verified.number = frame.number;
     verified.eye_in_world =
-        truth.world_from_body(scene.observer_body, frame.display_time) * scene.eye_in_sensor;
+        run.world_from_body(scene.observer_body, frame.display_time) * scene.eye_in_sensor;
     const RigidTransform world_from_object =
-        scene.object_body < 0 ? scene.world_from_object
-                              : truth.world_from_body(scene.object_body, frame.display_time) *
-                                    scene.world_from_object;
+        scene.object_body < 0
+            ? scene.world_from_object
+            : run.world_from_body(scene.object_body, frame.display_time) * scene.world_from_object;
 
     VENEER_ASSIGN(const simulation::EyeView view,
                   bench->look(world_from_object, verified.eye_in_world));
@@ -229,31 +177,35 @@ Result<RunVerification> verify_run(const RecordedRun& run,
     result.partial += comparison.partial;
     result.unlit += comparison.unlit;
     result.target_over_white += comparison.target_over_white;
-    VENEER_TRY(pictures.write("projector", frame.number, picture_of_codes(codes.view(), bits)));
-    VENEER_TRY(pictures.write_xyz("target", frame.number, target));
-    VENEER_TRY(pictures.write_xyz("received", frame.number, received));
-    VENEER_TRY(pictures.write("difference", frame.number, difference_picture(comparison)));
+    VENEER_TRY(pictures.codes("projector", frame.number, codes, bits));
+    VENEER_TRY(pictures.xyz("target", frame.number, target));
+    VENEER_TRY(pictures.xyz("received", frame.number, received));
+    VENEER_TRY(pictures.difference("difference", frame.number, comparison));
 
-    if (!run.uncompensated.empty()) {
-      const fs::path file = run.folder / run.uncompensated / frame.file.filename();
-      VENEER_ASSIGN(const Image<Rgb16> raw_codes, read_codes(file, bits));
+    if (const auto raw_file = uncompensated.find(frame.number); raw_file != uncompensated.end()) {
+      VENEER_ASSIGN(const Image<Rgb16> raw_codes, read_codes(raw_file->second, bits));
       VENEER_ASSIGN(const Image<Rgb32f> raw, bench->observe(view, raw_codes.view()));
       VENEER_ASSIGN(const simulation::Comparison raw_comparison, bench->compare(view, target, raw));
       uncompensated_pool.add(raw_comparison);
       verified.uncompensated_mean = raw_comparison.within_gamut.mean;
-      VENEER_TRY(pictures.write_xyz("uncompensated", frame.number, raw));
-      VENEER_TRY(pictures.write(
-          "uncompensated_difference", frame.number, difference_picture(raw_comparison)));
+      VENEER_TRY(pictures.xyz("uncompensated", frame.number, raw));
+      VENEER_TRY(pictures.difference("uncompensated_difference", frame.number, raw_comparison));
     }
     result.frames.push_back(verified);
     progress.advance(1);
   }
+  if (pool.covered.empty()) {
+    return fail(
+        Errc::kBadFormat,
+        "verifying {}: in none of its frames does the bench's eye see the object; do scene and "
+        "bench agree on where the observer walks?",
+        options.run.string());
+  }
   result.within_gamut = statistics(pool.within_gamut);
   result.covered = statistics(pool.covered);
   result.uncompensated = statistics(uncompensated_pool.within_gamut);
-  result.in_gamut_fraction = pool.covered.empty() ? 0
-                                                  : static_cast<double>(pool.within_gamut.size()) /
-                                                        static_cast<double>(pool.covered.size());
+  result.in_gamut_fraction =
+      static_cast<double>(pool.within_gamut.size()) / static_cast<double>(pool.covered.size());
   progress.finish(fmt::format(
       "dE00 {:.2f} mean, {:.2f} at 95 %", result.within_gamut.mean, result.within_gamut.p95));
   return result;

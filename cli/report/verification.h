@@ -15,15 +15,10 @@
 
 namespace veneer::cli {
 
-/// A finished run of veneerd: its folder holds the configuration, the scene, the summary and, in
-/// sub-folders, the frames it wrote.
-struct RecordedRun {
-  std::filesystem::path folder;
-  std::string frames = "frames";  ///< sub-folder of frames.jsonl and the pictures it names
-  std::string uncompensated;      ///< the same walk without compensation; none where empty
-};
-
 struct VerificationOptions {
+  std::filesystem::path run;  ///< folder of a run (RecordedRun)
+  /// Its sub-folder with frames of the same walk without compensation; none where empty.
+  std::string uncompensated;
   std::filesystem::path bench;  ///< bench.toml, the hidden truth
   std::filesystem::path set;    ///< the sample set that the material was fitted to
   /// Looks at every n-th recorded frame. >= 1.
@@ -32,7 +27,9 @@ struct VerificationOptions {
   std::filesystem::path pictures;
 };
 
-/// One frame as the eye received it.
+/// One frame as the eye received it. "Covered" are the pixels that lie wholly on the object,
+/// whether the projector reaches them or not; "within gamut" those of them that the bench's own
+/// projector could show with some drive.
 struct VerifiedFrame {
   std::uint64_t number = 0;
   Eigen::Vector3d eye_in_world = Eigen::Vector3d::Zero();  ///< true, at the moment of display
@@ -58,11 +55,11 @@ struct RunVerification {
 inline constexpr double kDifferenceScale = 10;
 
 /// Shows the frames of a run on the virtual bench, from the true place of the eye at the moment of
-/// display, and compares what is received with what the material would have sent.
-/// Errors: kNotFound, kBadFormat, kInvalidOption (a run with another tracker than the simulated
-/// one).
-[[nodiscard]] Result<RunVerification> verify_run(const RecordedRun& run,
-                                                 const VerificationOptions& options,
+/// display, and compares what is received with what the material would have sent. The object's pose
+/// and mesh are known to both sides; the bench refuses a run on another mesh or of another depth.
+/// Errors: those of RecordedRun, Scene, Bench and SampleSet; kInvalidOption (run and bench do not
+/// fit); kBadFormat (the eye saw nothing of the object).
+[[nodiscard]] Result<RunVerification> verify_run(const VerificationOptions& options,
                                                  Progress& progress);
 
 }  // namespace veneer::cli
