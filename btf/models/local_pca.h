@@ -51,10 +51,11 @@ struct LocalPca {
 ///
 /// Clusters are found in a randomised orthonormal basis of the rows, which keeps the distances that
 /// matter; the eigenvectors are then refined, and the weights projected, in the full space. Memory:
-/// a few times (rows + columns) * basis floats for each part and blocks of some thousand rows, never
-/// all rows at all columns, but for basis 0. The same for a seed on one machine, whatever the number
-/// of threads. Defined for any finite data: eigenvectors beyond a cluster's rank are zero, and so
-/// are those of clusters that stay empty because there are fewer different rows than clusters.
+/// a few times (rows + columns) * basis floats for each part and blocks of some thousand rows,
+/// never all rows at all columns, but for basis 0. The same for a seed on one machine, whatever the
+/// number of threads. Defined for any finite data: eigenvectors beyond a cluster's rank are zero,
+/// and so are those of clusters that stay empty because there are fewer different rows than
+/// clusters.
 ///
 /// Sources: Kambhatla and Leen 1997, "Dimension Reduction by Local Principal Component Analysis";
 /// Mueller, Meseth, Klein 2003, "Compression and Real-Time Rendering of Measured BTFs Using Local
