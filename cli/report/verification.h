@@ -46,8 +46,8 @@ struct RunVerification {
   simulation::DifferenceStatistics covered;
   simulation::DifferenceStatistics uncompensated;  ///< in gamut; count 0 where there is no such run
   double in_gamut_fraction = 0;
-  std::int64_t partial = 0;  ///< pixels left out: on an edge of the object
-  std::int64_t unlit = 0;    ///< covered pixels that no projector light reaches
+  std::int64_t partial = 0;            ///< pixels left out: on an edge of the object
+  std::int64_t unlit = 0;              ///< covered pixels that no projector light reaches
   std::int64_t target_over_white = 0;  ///< covered pixels whose target has L* > 100
 };
 
