@@ -205,7 +205,9 @@ Status import_rti(const fs::path& source,
   const std::string doing = fmt::format("importing {}", source.string());
   VENEER_ASSIGN(const fs::path lp, find_lp(source));
   VENEER_ASSIGN(const std::vector<Photo> photos, read_lp(lp));
-  VENEER_ASSIGN(const std::vector<fs::path> paths, find_pictures(lp.parent_path(), photos));
+  // A bare file name has no parent: its pictures lie in the folder one stands in.
+  const fs::path folder = lp.has_parent_path() ? lp.parent_path() : fs::path(".");
+  VENEER_ASSIGN(const std::vector<fs::path> paths, find_pictures(folder, photos));
   VENEER_ASSIGN(const Image<Rgb8> first, read_picture(paths.front()));
   const int width = first.width();
   const int height = first.height();

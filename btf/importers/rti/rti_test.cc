@@ -159,6 +159,15 @@ TEST_F(RtiFolder, RefusesAmbiguousPictures) {
   expect_refused(Errc::kBadFormat, "keep one");
 }
 
+TEST_F(RtiFolder, TakesABareFileNameFromTheFolderOneStandsIn) {
+  const fs::path before = fs::current_path();
+  fs::current_path(folder_.path() / "in");
+  SilentProgress progress;
+  const Status status = import_rti("lights.lp", folder_.path() / "bare.btfset", {}, progress);
+  fs::current_path(before);
+  EXPECT_TRUE(status) << status.error().what;
+}
+
 TEST_F(RtiFolder, MissingFolderIsNotFound) {
   fs::remove_all(folder_.path() / "in");
   expect_refused(Errc::kNotFound, "importing");
