@@ -2,11 +2,9 @@
 #include <nlohmann/json.hpp>
 
 #include "base/exit_code.h"
-#include "calibration/radiometry.h"
 #include "calibration/verification.h"
+#include "cli/bench_profile.h"
 #include "cli/commands/commands.h"
-#include "simulation/bench.h"
-#include "simulation/bench/colorimeter.h"
 
 namespace veneer::cli {
 
@@ -29,13 +27,8 @@ Result<int> run_calibrate(CommandLine& line) {
                 simulation::Bench::load(bench_path));
   simulation::VirtualPatchDisplay display(*bench);
   simulation::VirtualColorimeter colorimeter(*bench, display, {});
-  calibration::RadiometryOptions options;
-  options.bits = bench->truth().projector.bits;
-  options.reference_distance_m = bench->truth().projector.reference_distance_m;
-  VENEER_ASSIGN(
-      const calibration::MeasuredProfile measured,
-      calibration::measure_profile(
-          colorimeter, display, simulation::true_geometry(*bench), options, line.progress()));
+  VENEER_ASSIGN(const calibration::MeasuredProfile measured,
+                measure_profile_on_bench(*bench, display, colorimeter, line.progress()));
   for (const std::string& warning : measured.warnings) line.note("warning: " + warning);
   VENEER_TRY(measured.profile.save(out));
 

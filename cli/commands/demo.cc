@@ -12,11 +12,10 @@
 #include "base/files.h"
 #include "btf/material.h"
 #include "btf/sample_set.h"
-#include "calibration/radiometry.h"
+#include "cli/bench_profile.h"
 #include "cli/commands/commands.h"
 #include "cli/report/report.h"
 #include "render/scene.h"
-#include "simulation/bench/colorimeter.h"
 #include "simulation/materials/synthesize.h"
 
 namespace veneer::cli {
@@ -122,12 +121,8 @@ Status measure_profile(const fs::path& bench_path,
                 simulation::Bench::load(bench_path));
   simulation::VirtualPatchDisplay display(*bench);
   simulation::VirtualColorimeter colorimeter(*bench, display, {});
-  calibration::RadiometryOptions options;
-  options.bits = bench->truth().projector.bits;
-  options.reference_distance_m = bench->truth().projector.reference_distance_m;
   VENEER_ASSIGN(const calibration::MeasuredProfile measured,
-                calibration::measure_profile(
-                    colorimeter, display, simulation::true_geometry(*bench), options, progress));
+                measure_profile_on_bench(*bench, display, colorimeter, progress));
   return measured.profile.save(profile_path);
 }
 
