@@ -50,6 +50,7 @@ class FakeMaterial final : public Material {
   Eigen::Vector3d radiance(int, const Direction&, const Direction&) const override {
     return Eigen::Vector3d::Zero();
   }
+  double values_per_texel() const override { return 0.0; }
   ModelShader shader() const override {
     ModelShader shader;
     ModelTexture texture;

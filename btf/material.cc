@@ -20,14 +20,20 @@ constexpr std::string_view kVersion = "1";
 constexpr std::array kModels{
     Model{"dichromatic-lpca",
           "shading times body colour plus specular times light colour (Obara et al. 2006)",
+          2,
+          true,
           &fit_dichromatic_lpca,
           &load_dichromatic_lpca},
     Model{"lpca",
           "RGB Eigen-BRDFs of texel clusters, nine-fold interpolation (Mueller et al. 2003)",
+          1,
+          false,
           &fit_lpca,
           &load_lpca},
     Model{"texel-colours",
           "two learned colours a texel, scalar Eigen-BRDFs four to a volume (after Schneider 2004)",
+          2,
+          false,
           &fit_texel_colours,
           &load_texel_colours},
 };
@@ -44,6 +50,7 @@ Status FitOptions::check() const {
   constexpr int kMostClusters = 256;  // a texel stores its cluster in 8 bits
   VENEER_TRY(check_range("clusters", clusters, 1, kMostClusters));
   VENEER_TRY(check_range("angular", angular, kLeastAngular, kMostAngular));
+  VENEER_TRY(check_range("lobes", lobes, 1, kMostLobes));
   VENEER_TRY(check_range("basis", basis, 0, 4096));
   VENEER_TRY(check_range("iterations", iterations, 1, 10000));
   VENEER_TRY(parse_components(components));

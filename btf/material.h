@@ -34,6 +34,12 @@ struct FitOptions {
   int angular = 16;
   static constexpr int kLeastAngular = 4;
   static constexpr int kMostAngular = 32;
+  /// Lobes of a texel, for models made of them. 1 to 4.
+  int lobes = 2;
+  static constexpr int kMostLobes = 4;
+  /// How the GPU keeps what dominates a model's size, where it offers several: "8bit" or
+  /// "float16"; empty takes the model's own choice (revised-lpca, eigen-texture: 8bit).
+  std::string precision;
   /// Columns of the randomised basis in which clusters are found; 0 fits in the full space.
   int basis = 160;
   /// Lloyd iterations at most, from each start and after each swap of clusters.
@@ -62,6 +68,9 @@ class Material {
                                                  const Direction& view,
                                                  const Direction& light) const = 0;
   [[nodiscard]] virtual ModelShader shader() const = 0;
+  /// Numbers kept for one texel, whatever their precision, with a texel's share of what clusters
+  /// have in common; what a whole set shares is not counted (Meseth et al. 2003, Table 2).
+  [[nodiscard]] virtual double values_per_texel() const = 0;
   /// The factors and metadata that load() of the model reads back. The registry adds "format",
   /// "version" and "model".
   struct Contents {
@@ -79,6 +88,10 @@ class Material {
 struct Model {
   std::string_view name;
   std::string_view summary;  ///< one line, with author and year
+  /// How many numbers FitOptions::components has: 1 ("4"), 2 ("3+1"), or 0 where the model has no
+  /// components and does not read it.
+  int terms;
+  bool polarised;  ///< fits only sets that know specular and diffuse apart
   /// Errors: kInvalidOption (options the model cannot do with this set), kBadFormat (samples).
   Result<std::unique_ptr<Material>> (*fit)(const SampleSet& set,
                                            const FitOptions& options,

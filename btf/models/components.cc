@@ -55,6 +55,32 @@ Status refuse_form(const FitOptions& options, std::string_view model) {
               model);
 }
 
+Status refuse_precision(const FitOptions& options, std::string_view model) {
+  if (options.precision.empty()) return {};
+  return fail(Errc::kInvalidOption,
+              "fit: precision is \"{}\"; {} has only one, leave it out",
+              options.precision,
+              model);
+}
+
+Result<Precision> parse_precision(std::string_view text,
+                                  Precision otherwise,
+                                  std::string_view model) {
+  if (text.empty()) return otherwise;
+  for (const Precision precision : {Precision::k8Bit, Precision::kFloat16})
+    if (text == name_of(precision)) return precision;
+  return fail(Errc::kInvalidOption,
+              "fit: precision is \"{}\"; {} knows {} and {}",
+              text,
+              model,
+              name_of(Precision::k8Bit),
+              name_of(Precision::kFloat16));
+}
+
+std::string_view name_of(Precision precision) {
+  return precision == Precision::k8Bit ? "8bit" : "float16";
+}
+
 std::string format_components(const std::array<int, 2>& components) {
   return fmt::format("{}+{}", components[0], components[1]);
 }

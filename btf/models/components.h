@@ -29,6 +29,17 @@ inline constexpr int kMostComponents = 16;
 /// For models of one form. Errors: kInvalidOption where the options ask for another.
 [[nodiscard]] Status refuse_form(const FitOptions& options, std::string_view model);
 
+/// For models that keep everything in one precision. Errors: kInvalidOption.
+[[nodiscard]] Status refuse_precision(const FitOptions& options, std::string_view model);
+
+/// Kinds of FitOptions::precision.
+enum class Precision { k8Bit, kFloat16 };
+/// `otherwise` where the options leave it open. Errors: kInvalidOption.
+[[nodiscard]] Result<Precision> parse_precision(std::string_view text,
+                                                Precision otherwise,
+                                                std::string_view model);
+[[nodiscard]] std::string_view name_of(Precision precision);
+
 /// "3+1" again.
 [[nodiscard]] std::string format_components(const std::array<int, 2>& components);
 

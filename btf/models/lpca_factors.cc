@@ -17,6 +17,10 @@ std::span<const Eigen::half> LpcaFactors::eigen_brdf(int in_cluster, int compone
   return std::span(eigen_brdfs).subspan(index * count, count);
 }
 
+double LpcaFactors::values_per_texel(int texels) const {
+  return 1.0 + components + double(clusters) * components * columns / texels;
+}
+
 void LpcaFactors::reconstruct(int texel, int first, int count, std::span<float> values) const {
   using Halves = Eigen::Map<const Eigen::Array<Eigen::half, Eigen::Dynamic, 1>>;
   Eigen::Map<Eigen::ArrayXf> sum(values.data(), static_cast<Eigen::Index>(values.size()));

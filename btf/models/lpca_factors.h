@@ -18,6 +18,8 @@ struct LpcaFactors {
 
   [[nodiscard]] std::span<const Eigen::half> weights_of(int texel) const;
   [[nodiscard]] std::span<const Eigen::half> eigen_brdf(int in_cluster, int component) const;
+  /// A texel's weights and cluster, and its share of the Eigen-BRDFs.
+  [[nodiscard]] double values_per_texel(int texels) const;
   /// The sum of the components [first, first + count) of a texel at every column.
   void reconstruct(int texel, int first, int count, std::span<float> values) const;
 };

@@ -52,6 +52,10 @@ class PackedLpca {
 
   [[nodiscard]] const MaterialFrame& frame() const { return frame_; }
   [[nodiscard]] const Components& components() const { return layout_.components; }
+  /// As Material::values_per_texel(), without colours.
+  [[nodiscard]] double values_per_texel() const {
+    return factors_.values_per_texel(frame_.texel_count());
+  }
   /// Both functions of a texel at every measured pair, from the factors.
   void reconstruct(int texel, std::span<float> first, std::span<float> second) const;
   /// Both functions as drawn, from the float16 volumes in double precision. The horizon is the

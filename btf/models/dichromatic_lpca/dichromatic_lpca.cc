@@ -115,6 +115,8 @@ class Dichromatic final : public Material {
     return shader;
   }
 
+  double values_per_texel() const override { return scalars_.values_per_texel() + 3 * kColours; }
+
   Contents contents() const override {
     Contents contents;
     scalars_.add_to(contents);
@@ -202,6 +204,7 @@ Result<std::unique_ptr<Material>> fit_dichromatic_lpca(const SampleSet& set,
                                                        const FitOptions& options,
                                                        Progress& progress) {
   VENEER_TRY(options.check());
+  VENEER_TRY(refuse_precision(options, kName));
   VENEER_ASSIGN(const PackedLpca::Components components,
                 parse_two_terms(options.components, kName));
   if (!options.form.empty() && options.form != kRatio && options.form != kSubtractive)

@@ -81,6 +81,10 @@ class Lpca final : public Material {
 
   ModelShader shader() const override;
 
+  double values_per_texel() const override {
+    return factors_.values_per_texel(frame_.texel_count());
+  }
+
   Contents contents() const override {
     Contents contents;
     add_frame(frame_, contents);
@@ -169,6 +173,7 @@ Result<std::unique_ptr<Material>> fit_lpca(const SampleSet& set,
                                            Progress& progress) {
   VENEER_TRY(options.check());
   VENEER_TRY(refuse_form(options, kName));
+  VENEER_TRY(refuse_precision(options, kName));
   VENEER_ASSIGN(const int components, parse_one_term(options.components, kName));
   MaterialFrame frame = frame_of(set.info());
   VENEER_TRY(check_textures(frame, components, Errc::kInvalidOption, "fit"));

@@ -78,6 +78,8 @@ class TexelColours final : public Material {
     return shader;
   }
 
+  double values_per_texel() const override { return scalars_.values_per_texel() + 3 * kColours; }
+
   Contents contents() const override {
     Contents contents;
     scalars_.add_to(contents);
@@ -102,6 +104,7 @@ Result<std::unique_ptr<Material>> fit_texel_colours(const SampleSet& set,
                                                     Progress& progress) {
   VENEER_TRY(options.check());
   VENEER_TRY(refuse_form(options, kName));
+  VENEER_TRY(refuse_precision(options, kName));
   VENEER_ASSIGN(const PackedLpca::Components components,
                 parse_two_terms(options.components, kName));
   const MaterialFrame frame = frame_of(set.info());
