@@ -33,6 +33,7 @@ class ShaderMaterial final : public btf::Material {
     return Eigen::Vector3d::Zero();
   }
   [[nodiscard]] btf::ModelShader shader() const override { return shader_; }
+  [[nodiscard]] double values_per_texel() const override { return 0.0; }
   [[nodiscard]] Contents contents() const override { return {}; }
 
  private:
