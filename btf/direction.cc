@@ -7,6 +7,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <initializer_list>
 #include <numbers>
 #include <string>
 #include <string_view>
@@ -33,6 +34,24 @@ std::optional<double> parse_number(std::string_view text) {
   return value;
 }
 
+// Directions on rings around the normal, evenly spaced from a first azimuth; degrees.
+struct Ring {
+  double theta;
+  double first_phi;
+  int count;
+};
+DirectionSet on_rings(std::initializer_list<Ring> rings) {
+  DirectionSet directions;
+  for (const Ring& ring : rings) {
+    for (int i = 0; i < ring.count; ++i) {
+      const double phi = ring.first_phi + 360.0 * i / ring.count;
+      directions.push_back(
+          direction_from_angles({ring.theta * kRadiansPerDegree, phi * kRadiansPerDegree}));
+    }
+  }
+  return directions;
+}
+
 }  // namespace
 
 Direction direction_from_angles(const Angles& angles) {
@@ -54,16 +73,25 @@ Angles angles_from_direction(const Direction& direction) {
 }
 
 DirectionSet bonn_directions() {
-  constexpr std::array kAzimuths{1, 6, 12, 18, 20, 24};
-  DirectionSet directions;
-  for (std::size_t ring = 0; ring < kAzimuths.size(); ++ring) {
-    const double theta = 15.0 * kRadiansPerDegree * static_cast<double>(ring);
-    for (int i = 0; i < kAzimuths[ring]; ++i) {
-      directions.push_back(
-          direction_from_angles({theta, 360.0 * kRadiansPerDegree * i / kAzimuths[ring]}));
-    }
-  }
-  return directions;
+  return on_rings({{0.0, 0.0, 1},
+                   {15.0, 0.0, 6},
+                   {30.0, 0.0, 12},
+                   {45.0, 0.0, 18},
+                   {60.0, 0.0, 20},
+                   {75.0, 0.0, 24}});
+}
+
+DirectionSet ubo2014_directions() {
+  return on_rings({{0.0, 0.0, 1},
+                   {11.0, 15.0, 6},
+                   {23.5, 0.0, 12},
+                   {30.0, 15.0, 12},
+                   {37.5, 0.0, 12},
+                   {45.0, 0.0, 18},
+                   {52.5, 7.5, 18},
+                   {60.0, 0.0, 24},
+                   {67.5, 7.5, 24},
+                   {75.0, 0.0, 24}});
 }
 
 std::optional<std::pair<int, int>> find_equal_directions(const DirectionSet& directions) {

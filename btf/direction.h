@@ -34,6 +34,11 @@ using DirectionSet = std::vector<Direction>;
 /// degrees with 1, 6, 12, 18, 20, 24 azimuths that start at 0.
 [[nodiscard]] DirectionSet bonn_directions();
 
+/// The 151 directions of the UBO2014 measurements (Weinmann, Gall, Klein 2014): theta 0, 11, 23.5,
+/// 30, 37.5, ... 75 degrees with 1, 6, 12, 12, 12, 18, 18, 24, 24, 24 azimuths, some rings turned
+/// by half a step of 30 or 15 degrees.
+[[nodiscard]] DirectionSet ubo2014_directions();
+
 /// Directions nearer than this chord count as equal: far below what any measuring
 /// device resolves, far enough apart for triangles in double precision.
 inline constexpr double kEqualDirections = 1e-6;

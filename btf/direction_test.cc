@@ -3,7 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
 #include <limits>
+#include <map>
 #include <numbers>
 
 #include "base/files.h"
@@ -52,6 +56,46 @@ TEST(BonnDirections, AreTheRingsOfTheMeasurement) {
   EXPECT_NEAR(set[1].y(), 0.0, kRounding);  // first azimuth 0
   EXPECT_NEAR(angles_from_direction(set[2]).phi, std::numbers::pi / 3.0, kRounding);  // 6 in a ring
   EXPECT_NEAR(angles_from_direction(set[80]).theta, 75.0 * std::numbers::pi / 180.0, kRounding);
+}
+
+TEST(Ubo2014Directions, AreTheRingsOfTheMeasurement) {
+  const DirectionSet set = ubo2014_directions();
+  ASSERT_EQ(set.size(), 151U);
+  EXPECT_FALSE(find_equal_directions(set));
+  std::map<int, int> counts;  // by theta in tenths of a degree
+  for (const Direction& d : set)
+    ++counts[static_cast<int>(
+        std::lround(angles_from_direction(d).theta * 1800.0 / std::numbers::pi))];
+  const std::map<int, int> expected{{0, 1},
+                                    {110, 6},
+                                    {235, 12},
+                                    {300, 12},
+                                    {375, 12},
+                                    {450, 18},
+                                    {525, 18},
+                                    {600, 24},
+                                    {675, 24},
+                                    {750, 24}};
+  EXPECT_EQ(counts, expected);
+}
+
+// The measured list as it stands beside a set of the same laboratory: 151 x, then y, z, in double.
+TEST(Ubo2014Directions, AreThoseOfTheRealFile) {
+  const char* data = std::getenv("VENEER_DATA");
+  const std::filesystem::path path =
+      std::filesystem::path(data == nullptr ? "" : data) / "sparsebtf_carpet07" / "xyz_loc.bin";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << "real data absent: " << path;
+  const std::string bytes = read_text(path).value();
+  ASSERT_GE(bytes.size(), 3 * 151 * sizeof(double));
+  std::vector<double> xyz(3 * 151);
+  std::memcpy(xyz.data(), bytes.data(), xyz.size() * sizeof(double));
+  const DirectionSet set = ubo2014_directions();
+  for (std::size_t i = 0; i < 151; ++i) {
+    const Direction real(xyz[i], xyz[151 + i], xyz[302 + i]);
+    double nearest = 2.0;
+    for (const Direction& d : set) nearest = std::min(nearest, (d - real).norm());
+    EXPECT_LT(nearest, 1e-5) << i << ": " << real.transpose();  // the file comes from float
+  }
 }
 
 TEST(FindEqualDirections, NamesTheFirstPair) {

@@ -7,7 +7,9 @@
 
 #include "btf/importers/btfbase/btfbase.h"
 #include "btf/importers/crop.h"
+#include "btf/importers/merl/merl.h"
 #include "btf/importers/rti/rti.h"
+#include "btf/importers/utia/utia.h"
 
 namespace veneer::btf {
 namespace {
@@ -16,7 +18,9 @@ constexpr std::array kImporters{
     Importer{"btfbase",
              "text code-books of multi-level vector quantisation (Havran 2010)",
              &import_btfbase},
+    Importer{"merl", "an isotropic BRDF of the MERL database (.binary)", &import_merl},
     Importer{"rti", "a fixed camera and many lights: a .lp file and its pictures", &import_rti},
+    Importer{"utia", "an anisotropic BRDF of the UTIA database (.bin)", &import_utia},
 };
 static_assert(std::ranges::is_sorted(kImporters, {}, &Importer::name));
 

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "base/progress.h"
@@ -21,6 +22,9 @@ struct Crop {
 
 struct ImportOptions {
   std::optional<Crop> crop;  ///< the whole where absent
+  /// Where a BRDF is sampled, which has no directions of its own: "bonn81" or "ubo151" for the
+  /// lists of direction.h, as views and as lights.
+  std::string directions = "bonn81";
 };
 
 /// One line of the importers' registry: brings a source to a sample set, in the sample's unit.
