@@ -7,6 +7,7 @@
 
 #include "btf/models/components.h"
 #include "btf/models/dichromatic_lpca/dichromatic_lpca.h"
+#include "btf/models/lafortune/lafortune.h"
 #include "btf/models/lpca/lpca.h"
 #include "btf/models/texel_colours/texel_colours.h"
 
@@ -24,6 +25,12 @@ constexpr std::array kModels{
           true,
           &fit_dichromatic_lpca,
           &load_dichromatic_lpca},
+    Model{"lafortune",
+          "Lafortune lobes under one specular colour (McAllister et al. 2002)",
+          0,
+          false,
+          &fit_lafortune,
+          &load_lafortune},
     Model{"lpca",
           "RGB Eigen-BRDFs of texel clusters, nine-fold interpolation (Mueller et al. 2003)",
           1,

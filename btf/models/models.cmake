@@ -8,6 +8,9 @@ set(VENEER_MODEL_SRCS
   models/concentric_square.cc
   models/dichromatic_lpca/dichromatic_lpca.cc
   models/direction_lookup.cc
+  models/lafortune/lafortune.cc
+  models/lobes/lafortune_lobes.cc
+  models/lobes/lobe_fit.cc
   models/local_pca.cc
   models/lpca/lpca.cc
   models/lpca_factors.cc
@@ -25,6 +28,9 @@ set(VENEER_MODEL_SHADERS
   models/dichromatic_lpca/dichromatic_lpca.glsl
   models/direction_lookup.glsl
   models/elevated_concentric.glsl
+  models/lafortune/lafortune.glsl
+  models/lobes/lafortune_lobes.glsl
+  models/lobes/lobes.glsl
   models/lpca/lpca.glsl
   models/packed_lpca.glsl
   models/texel_at.glsl

@@ -95,6 +95,10 @@ bool has_form(const Model& model, std::string_view form) {
   return form.empty() || model.name == "dichromatic-lpca";
 }
 
+bool is_formula_of_view(const Model& model) {
+  return model.name == "lafortune" || model.name == "scaled-lafortune" || model.name == "phong";
+}
+
 double largest_error(const SampleSet& set, const Material& material) {
   std::vector<float> wanted(static_cast<std::size_t>(set.info().pair_count()) * 3);
   std::vector<float> got(wanted.size());
@@ -365,9 +369,12 @@ TEST(Models, AFixedViewIsALegalSet) {
     const auto material = fit(model.name, set, options_with(components_of(model, "2", "1+1"), 12));
     ASSERT_TRUE(material) << material.error().what;
     const Direction light = info.lights[3];
-    EXPECT_EQ((*material)->radiance(2, Direction::UnitZ(), light),
-              (*material)->radiance(2, Direction::UnitX(), light))
-        << model.name;
+    // A formula of the view says something about views that were not measured.
+    if (!is_formula_of_view(model)) {
+      EXPECT_EQ((*material)->radiance(2, Direction::UnitZ(), light),
+                (*material)->radiance(2, Direction::UnitX(), light))
+          << model.name;
+    }
     EXPECT_GT((*material)->shader().gpu_bytes(), 0U);
   }
 }
@@ -486,7 +493,10 @@ TEST(LoadMaterial, RefusesDamagedFilesWithAMessage) {
     };
 
     ASSERT_TRUE(load_changed([](auto&) {}));
-    for (const char* key : {"format", "version", "model", "width", "components"}) {
+    std::vector<std::string> keys{"format", "version", "model", "width"};
+    for (const char* key : {"components", "lobes", "fallback_texels"})
+      if (good.metadata.contains(key)) keys.emplace_back(key);
+    for (const std::string& key : keys) {
       expect_refused(key, [key](auto& c) { c.metadata.erase(key); });
       expect_refused(key, [key](auto& c) { c.metadata[key] = "-7"; });
     }

@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "btf/models/lobes/lobe_fit.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/result.h"
+#include "btf/models/material_tensors.h"
+
+namespace veneer::btf {
+namespace {
+
+// Samples that starts are tried on.
+constexpr Eigen::Index kPartSamples = 768;
+constexpr int kPartIterations = 12;
+constexpr int kIterations = 25;
+// A step that gains less than this part of the error is the last but one.
+constexpr double kLeastGain = 1e-4;
+// What a lobe may rise to anywhere, relative to its largest value at a sample.
+constexpr float kMostRise = 4.0F;
+// Amplitudes relative to the largest: less is invisible, and C = c amplitude^(1/n) must not vanish
+// in float16.
+constexpr float kLeastAmplitude = 1e-3F;
+// A lobe that is added starts small beside those that fit already.
+constexpr float kAddedAmplitude = 0.3F;
+// Rows whose products are summed in float before they join the sums in double.
+constexpr Eigen::Index kBlock = 512;
+// Below any positive base that matters, above where a square underflows.
+constexpr float kTinyBase = 1e-15F;
+// Two columns are parallel where the determinant of their Gram matrix is this part of its diagonal.
+constexpr double kParallel = 1e-7;
+constexpr double kLeastDamping = 1e-7;
+constexpr double kMostDamping = 1e7;
+constexpr int kColumns = 2;  // the diffuse column and that of all lobes
+
+using Block = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic>;
+
+// Products of the columns (diffuse, lobes, derivatives by each lobe's c and log n), with each other
+// and with the targets.
+struct Products {
+  Eigen::MatrixXd gram;
+  Eigen::MatrixX3d by_target;
+  double target = 0.0;  // squared
+};
+
+// The colours that fit best, and what is left.
+struct Colours {
+  Eigen::Matrix<double, kColumns, 3> value = Eigen::Matrix<double, kColumns, 3>::Zero();
+  double squared_error = 0.0;
+};
+
+// The largest base over all directions.
+float reach(LobeSpace space, const Eigen::Vector3f& c) {
+  const float up = std::max(c.z(), 0.0F);
+  if (space == LobeSpace::kPair) return std::max(c.head<2>().cwiseAbs().maxCoeff(), up);
+  return std::hypot(c.head<2>().norm(), up);
+}
+
+// Bounded exponents, largest base and largest amplitude 1. False where a lobe reaches no sample.
+bool normalise(const LobeSamples& samples, std::span<LobeShape> shapes) {
+  float largest = 0.0F;
+  for (LobeShape& shape : shapes) {
+    const float r = reach(samples.space, shape.c);
+    if (!(r > 0.0F) || !shape.c.allFinite() || !std::isfinite(shape.exponent)) return false;
+    const float peak = (samples.u.matrix() * (shape.c / r)).maxCoeff();
+    if (!(peak > 0.0F)) return false;
+    const float bound = peak < 1.0F ? std::log(kMostRise) / -std::log(peak) : kMostExponent;
+    shape.exponent = std::clamp(
+        shape.exponent, kLeastExponent, std::clamp(bound, kLeastExponent, kMostExponent));
+    shape.amplitude *= std::pow(r, shape.exponent);
+    shape.c /= r;
+    largest = std::max(largest, shape.amplitude);
+  }
+  if (!std::isfinite(largest) || !(largest > 0.0F)) return false;
+  for (LobeShape& shape : shapes)
+    shape.amplitude = std::max(shape.amplitude / largest, kLeastAmplitude);
+  return true;
+}
+
+// Without derivatives where `slopes` is false.
+Products products_of(const LobeSamples& samples,
+                     const LobeTargets& targets,
+                     std::span<const LobeShape> shapes,
+                     bool slopes) {
+  const auto columns =
+      kColumns + (slopes ? kLobeValues * static_cast<Eigen::Index>(shapes.size()) : 0);
+  Products sums{Eigen::MatrixXd::Zero(columns, columns), Eigen::MatrixX3d::Zero(columns, 3), 0.0};
+  Block block(std::min(kBlock, samples.u.rows()), columns);
+  Eigen::ArrayXf base;
+  Eigen::ArrayXf logarithm;
+  Eigen::ArrayXf value;
+  for (Eigen::Index begin = 0; begin < samples.u.rows(); begin += kBlock) {
+    const Eigen::Index rows = std::min(kBlock, samples.u.rows() - begin);
+    const auto u = samples.u.middleRows(begin, rows);
+    auto part = block.topRows(rows);
+    part.col(0) = samples.cosine.segment(begin, rows) * targets.weight.segment(begin, rows);
+    part.col(1).setZero();
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      const LobeShape& shape = shapes[i];
+      base = (u.col(0) * shape.c.x() + u.col(1) * shape.c.y() + u.col(2) * shape.c.z()).max(0.0F);
+      logarithm = base.max(kTinyBase).log();
+      value = (shape.exponent * logarithm).exp() * (shape.amplitude * part.col(0).array());
+      part.col(1).array() += value;
+      if (!slopes) continue;
+      const auto at = kColumns + kLobeValues * static_cast<Eigen::Index>(i);
+      part.col(at + 3) = shape.exponent * value * logarithm;
+      // n value / base, and 0 where the base is not positive.
+      value *= shape.exponent * base / (base.square() + kTinyBase * kTinyBase);
+      for (int axis = 0; axis < 3; ++axis) part.col(at + axis) = value * u.col(axis);
+    }
+    const auto rgb = targets.rgb.middleRows(begin, rows);
+    sums.gram += (part.transpose() * part).cast<double>();
+    sums.by_target += (part.transpose() * rgb).cast<double>();
+    sums.target += static_cast<double>(rgb.squaredNorm());
+  }
+  return sums;
+}
+
+// Least squares with both colours >= 0, for each channel on its own.
+Colours solve(const Products& products, Diffuse diffuse) {
+  const Eigen::Matrix2d gram = products.gram.topLeftCorner<kColumns, kColumns>();
+  Colours colours{.squared_error = products.target};
+  for (int channel = 0; channel < 3; ++channel) {
+    const Eigen::Vector2d b = products.by_target.col(channel).head<kColumns>();
+    const auto alone = [&](int column) {
+      const double square = gram(column, column);
+      return square > 0.0 ? std::max(b[column], 0.0) / square : 0.0;
+    };
+    Eigen::Vector2d x(0.0, alone(1));
+    if (diffuse == Diffuse::kFree) {
+      const double determinant = gram.determinant();
+      Eigen::Vector2d both(gram(1, 1) * b[0] - gram(0, 1) * b[1],
+                           gram(0, 0) * b[1] - gram(0, 1) * b[0]);
+      if (determinant > kParallel * gram(0, 0) * gram(1, 1))
+        both /= determinant;
+      else
+        both.setConstant(-1.0);
+      if (both.minCoeff() >= 0.0)
+        x = both;
+      else if (alone(0) * b[0] >= x[1] * b[1])
+        x = {alone(0), 0.0};
+    }
+    colours.value.col(channel) = x;
+    colours.squared_error += x.dot(gram * x) - 2.0 * x.dot(b);
+  }
+  colours.squared_error = std::max(colours.squared_error, 0.0);
+  return colours;
+}
+
+// Normal equations of the lobes' parameters, the colours projected out. A colour at its bound is no
+// unknown there.
+struct Step {
+  Eigen::MatrixXd matrix;
+  Eigen::VectorXd gradient;
+};
+Step step_of(const Products& products, const Colours& colours) {
+  const Eigen::Index unknowns = products.gram.rows() - kColumns;
+  const Eigen::Matrix2d gram = products.gram.topLeftCorner<kColumns, kColumns>();
+  const auto cross = products.gram.bottomLeftCorner(unknowns, kColumns);
+  const auto slopes = products.gram.bottomRightCorner(unknowns, unknowns);
+  Step step{Eigen::MatrixXd::Zero(unknowns, unknowns), Eigen::VectorXd::Zero(unknowns)};
+  for (int channel = 0; channel < 3; ++channel) {
+    const Eigen::Vector2d x = colours.value.col(channel);
+    if (!(x[1] > 0.0)) continue;
+    Eigen::Matrix2d inverse = Eigen::Matrix2d::Zero();
+    if (x[0] > 0.0)
+      inverse = gram.inverse();
+    else
+      inverse(1, 1) = 1.0 / gram(1, 1);
+    step.matrix += x[1] * x[1] * (slopes - cross * inverse * cross.transpose());
+    step.gradient += x[1] * (products.by_target.col(channel).tail(unknowns) - cross * x);
+  }
+  return step;
+}
+
+std::vector<LobeShape> moved(std::span<const LobeShape> shapes, const Eigen::VectorXd& by) {
+  std::vector<LobeShape> result(shapes.begin(), shapes.end());
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    const Eigen::Vector4d d = by.segment<kLobeValues>(kLobeValues * static_cast<Eigen::Index>(i));
+    result[i].c += d.head<3>().cast<float>();
+    result[i].exponent *= static_cast<float>(std::exp(std::clamp(d[3], -1.0, 1.0)));
+  }
+  return result;
+}
+
+// Levenberg-Marquardt; returns the squared error reached, infinite where the start reaches nothing.
+double descend(const LobeSamples& samples,
+               const LobeTargets& targets,
+               Diffuse diffuse,
+               int iterations,
+               std::vector<LobeShape>& shapes) {
+  if (!normalise(samples, shapes)) return std::numeric_limits<double>::infinity();
+  Products products = products_of(samples, targets, shapes, true);
+  Colours colours = solve(products, diffuse);
+  double damping = 1e-2;
+  for (int i = 0; i < iterations && damping < kMostDamping; ++i) {
+    Step step = step_of(products, colours);
+    const double scale = step.matrix.diagonal().maxCoeff();
+    if (!(scale > 0.0)) break;
+    // Marquardt's scaling, with a floor for what the samples do not say at all.
+    step.matrix.diagonal() +=
+        damping * (step.matrix.diagonal().cwiseMax(0.0).array() + 1e-6 * scale).matrix();
+    std::vector<LobeShape> tried = moved(shapes, step.matrix.ldlt().solve(step.gradient));
+    const double before = colours.squared_error;
+    if (normalise(samples, tried)) {
+      Products at_tried = products_of(samples, targets, tried, true);
+      const Colours then = solve(at_tried, diffuse);
+      if (then.squared_error < before) {
+        shapes = std::move(tried);
+        products = std::move(at_tried);
+        colours = then;
+        damping = std::max(damping * 0.2, kLeastDamping);
+        if (before - then.squared_error < kLeastGain * before) break;
+        continue;
+      }
+    }
+    damping *= 5.0;
+  }
+  return colours.squared_error;
+}
+
+LobeSamples rows_of(const LobeSamples& all, const std::vector<Eigen::Index>& rows) {
+  LobeSamples part{all.space,
+                   Eigen::ArrayX3f(static_cast<Eigen::Index>(rows.size()), 3),
+                   Eigen::ArrayXf(static_cast<Eigen::Index>(rows.size()))};
+  for (Eigen::Index i = 0; i < part.u.rows(); ++i) {
+    part.u.row(i) = all.u.row(rows[static_cast<std::size_t>(i)]);
+    part.cosine[i] = all.cosine[rows[static_cast<std::size_t>(i)]];
+  }
+  return part;
+}
+
+}  // namespace
+
+double lobe_value(std::span<const Eigen::half> stored, const Eigen::Vector3d& u) {
+  const Eigen::Vector3d c(static_cast<double>(stored[0]),
+                          static_cast<double>(stored[1]),
+                          static_cast<double>(stored[2]));
+  const double base = c.dot(u);
+  return base > 0.0 ? std::pow(base, static_cast<double>(stored[3])) : 0.0;
+}
+
+LobeFitter::LobeFitter(LobeSamples samples, int lobes) : all_(std::move(samples)), lobes_(lobes) {
+  VENEER_CHECK(all_.u.rows() > 0 && all_.u.rows() == all_.cosine.size() && lobes > 0);
+  // An irrational stride, so that views and lights are taken evenly whatever their numbers.
+  const Eigen::Index rows = all_.u.rows();
+  const double golden = (std::sqrt(5.0) - 1.0) / 2.0;
+  for (Eigen::Index i = 0; i < std::min(rows, kPartSamples); ++i) {
+    const double place = static_cast<double>(i) * golden;
+    part_rows_.push_back(
+        rows <= kPartSamples
+            ? i
+            : static_cast<Eigen::Index>((place - std::floor(place)) * static_cast<double>(rows)));
+  }
+  std::ranges::sort(part_rows_);
+  part_rows_.erase(std::ranges::unique(part_rows_).begin(), part_rows_.end());
+  part_ = rows_of(all_, part_rows_);
+}
+
+std::vector<LobeShape> LobeFitter::fit(const LobeTargets& targets,
+                                       std::span<const LobeShape> starts) const {
+  const auto rows = static_cast<Eigen::Index>(part_rows_.size());
+  LobeTargets part{Eigen::ArrayXf(rows), Eigen::MatrixX3f(rows, 3)};
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    part.weight[i] = targets.weight[part_rows_[static_cast<std::size_t>(i)]];
+    part.rgb.row(i) = targets.rgb.row(part_rows_[static_cast<std::size_t>(i)]);
+  }
+  std::vector<LobeShape> shapes;
+  for (int lobe = 0; lobe < lobes_; ++lobe) {
+    double least = std::numeric_limits<double>::infinity();
+    std::vector<LobeShape> best = shapes;
+    best.push_back(starts.front());
+    for (const LobeShape& start : starts) {
+      std::vector<LobeShape> tried = shapes;
+      tried.push_back(start);
+      if (lobe > 0) tried.back().amplitude = kAddedAmplitude;
+      const double error = descend(part_, part, Diffuse::kFree, kPartIterations, tried);
+      if (!(error < least)) continue;
+      least = error;
+      best = std::move(tried);
+    }
+    shapes = std::move(best);
+  }
+  refine(targets, Diffuse::kFree, shapes);
+  return shapes;
+}
+
+void LobeFitter::refine(const LobeTargets& targets,
+                        Diffuse diffuse,
+                        std::vector<LobeShape>& shapes) const {
+  descend(all_, targets, diffuse, kIterations, shapes);
+}
+
+StoredLobes LobeFitter::store(const LobeTargets& targets,
+                              Diffuse diffuse,
+                              std::span<const LobeShape> shapes) const {
+  StoredLobes stored;
+  std::vector<LobeShape> rounded;
+  for (const LobeShape& shape : shapes) {
+    const Eigen::half exponent = saturated_half(shape.exponent);
+    const float scale = std::pow(shape.amplitude, 1.0F / static_cast<float>(exponent));
+    LobeShape& as_stored = rounded.emplace_back();
+    for (int axis = 0; axis < 3; ++axis) {
+      stored.lobes.push_back(saturated_half(scale * shape.c[axis]));
+      as_stored.c[axis] = static_cast<float>(stored.lobes.back());
+    }
+    stored.lobes.push_back(exponent);
+    as_stored.exponent = static_cast<float>(exponent);
+  }
+  for (int i = static_cast<int>(shapes.size()); i < lobes_; ++i)
+    for (const float value : {0.0F, 0.0F, 0.0F, kLeastExponent})
+      stored.lobes.push_back(Eigen::half(value));
+  const Products products = products_of(all_, targets, rounded, false);
+  const Colours colours = solve(products, diffuse);
+  stored.squared_error = products.target;
+  for (int channel = 0; channel < 3; ++channel) {
+    stored.diffuse[static_cast<std::size_t>(channel)] =
+        saturated_half(static_cast<float>(colours.value(0, channel)));
+    stored.specular[static_cast<std::size_t>(channel)] =
+        saturated_half(static_cast<float>(colours.value(1, channel)));
+    const Eigen::Vector2d x(
+        static_cast<double>(stored.diffuse[static_cast<std::size_t>(channel)]),
+        static_cast<double>(stored.specular[static_cast<std::size_t>(channel)]));
+    stored.squared_error += x.dot(products.gram * x) - 2.0 * x.dot(products.by_target.col(channel));
+  }
+  return stored;
+}
+
+}  // namespace veneer::btf
