@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/progress.h"
+#include "btf/communicator.h"
 #include "btf/models/matrix_product.h"
 
 namespace veneer::btf {
@@ -52,10 +53,11 @@ struct LocalPca {
 /// Clusters are found in a randomised orthonormal basis of the rows, which keeps the distances that
 /// matter; the eigenvectors are then refined, and the weights projected, in the full space. Memory:
 /// a few times (rows + columns) * basis floats for each part and blocks of some thousand rows,
-/// never all rows at all columns, but for basis 0. The same for a seed on one machine, whatever the
-/// number of threads. Defined for any finite data: eigenvectors beyond a cluster's rank are zero,
-/// and so are those of clusters that stay empty because there are fewer different rows than
-/// clusters.
+/// never all rows at all columns, but for basis 0. Each of `ranks` reads, holds and works on the
+/// rows that rows_of_rank() gives it, and has the whole result in the end. The same for a seed on
+/// one machine, whatever the number of threads; on other numbers of ranks the same but for
+/// rounding. Defined for any finite data: eigenvectors beyond a cluster's rank are zero, and so are
+/// those of clusters that stay empty because there are fewer different rows than clusters.
 ///
 /// Sources: Kambhatla and Leen 1997, "Dimension Reduction by Local Principal Component Analysis";
 /// Mueller, Meseth, Klein 2003, "Compression and Real-Time Rendering of Measured BTFs Using Local
@@ -63,6 +65,7 @@ struct LocalPca {
 /// 4.4; the start: Arthur and Vassilvitskii 2007, "k-means++".
 [[nodiscard]] LocalPca fit_local_pca(const RowSource& source,
                                      const LocalPcaOptions& options,
-                                     Progress& progress);
+                                     Progress& progress,
+                                     Communicator& ranks = alone());
 
 }  // namespace veneer::btf

@@ -17,6 +17,7 @@
 #include <string>
 
 #include "base/random.h"
+#include "btf/internal_thread_ranks.h"
 
 namespace veneer::btf {
 namespace {
@@ -182,6 +183,53 @@ TEST(LocalPca, IsTheSameForAnyNumberOfThreads) {
     results.insert(result);
   }
   EXPECT_EQ(results.size(), 1U);
+}
+
+// The same rows, sums made in another order. Of each rank, so that all are seen to have everything.
+TEST(LocalPca, IsTheSameOnAnyNumberOfRanks) {
+  struct Case {
+    int rows;
+    int columns;
+    LocalPcaOptions options;
+  };
+  for (const Case& c : {Case{700, 300, {.clusters = 5, .components = {3}, .basis = 40}},
+                        Case{701, 90, {.clusters = 9, .components = {2}, .basis = 0}},
+                        Case{5000, 40, {.clusters = 6, .components = {2}, .basis = 20}},
+                        Case{2, 40, {.clusters = 4, .components = {2}}}}) {
+    const RowMatrix data = random_matrix(c.rows, 30, 23) * random_matrix(30, c.columns, 24) +
+                           0.1F * random_matrix(c.rows, c.columns, 25);
+    const LocalPca single = fit(data, c.options);
+    const RowMatrix expected = reconstruct(single, 0, 0, c.options.components.front());
+    for (const int size : {2, 3}) {
+      run_on_ranks(size, [&](Communicator& ranks) {
+        SilentProgress progress;
+        const LocalPca pca =
+            fit_local_pca(source_of(data, {c.columns}), c.options, progress, ranks);
+        const std::string where =
+            fmt::format("{} x {}, rank {} of {}", c.rows, c.columns, ranks.rank(), ranks.size());
+        EXPECT_EQ(pca.cluster, single.cluster) << where;
+        EXPECT_LT((reconstruct(pca, 0, 0, c.options.components.front()) - expected).norm(),
+                  kFloatTolerance * expected.norm())
+            << where;
+        EXPECT_NEAR(pca.unexplained, single.unexplained, kFloatTolerance) << where;
+      });
+    }
+  }
+}
+
+TEST(LocalPca, ReadsOnlyItsOwnRows) {
+  const RowMatrix data = random_matrix(100, 20, 26);
+  run_on_ranks(3, [&](Communicator& ranks) {
+    RowSource source = source_of(data, {20});
+    const RowRange own = rows_of_rank(100, ranks);
+    source.read = [read = source.read, own](int row, std::span<float> values) {
+      EXPECT_TRUE(row >= own.first && row < own.first + own.count);
+      read(row, values);
+    };
+    SilentProgress progress;
+    EXPECT_EQ(fit_local_pca(source, {.clusters = 3, .components = {2}}, progress, ranks).clusters,
+              3);
+  });
 }
 
 TEST(LocalPca, IsDefinedAtTheEdges) {

@@ -24,7 +24,8 @@ void gemm(CBLAS_TRANSPOSE op_a,
           const RowBlock& a,
           const RowBlock& b,
           float beta,
-          MutableRowBlock& out) {
+          MutableRowBlock& out,
+          Threads threads) {
   if (out.size() == 0) return;
   if (inner == 0) {
     out *= beta;
@@ -34,7 +35,7 @@ void gemm(CBLAS_TRANSPOSE op_a,
   VENEER_CHECK(kOneThread);
   const Eigen::Index across = (out.cols() + kBlockColumns - 1) / kBlockColumns;
   const Eigen::Index down = (out.rows() + kBlockRows - 1) / kBlockRows;
-  parallel_for(across * down, 1, [&](std::int64_t begin, std::int64_t end) {
+  const auto make = [&](std::int64_t begin, std::int64_t end) {
     for (std::int64_t block = begin; block < end; ++block) {
       const Eigen::Index row = block / across * kBlockRows;
       const Eigen::Index column = block % across * kBlockColumns;
@@ -53,24 +54,34 @@ void gemm(CBLAS_TRANSPOSE op_a,
                   out.data() + row * out.outerStride() + column,
                   static_cast<int>(out.outerStride()));
     }
-  });
+  };
+  if (threads == Threads::kAll)
+    parallel_for(across * down, 1, make);
+  else
+    make(0, across * down);
 }
 
 }  // namespace
 
-void product(const RowBlock& a, const RowBlock& b, MutableRowBlock out) {
+void product(const RowBlock& a, const RowBlock& b, MutableRowBlock out, Threads threads) {
   VENEER_CHECK(a.cols() == b.rows() && out.rows() == a.rows() && out.cols() == b.cols());
-  gemm(CblasNoTrans, CblasNoTrans, a.cols(), a, b, 0.0F, out);
+  gemm(CblasNoTrans, CblasNoTrans, a.cols(), a, b, 0.0F, out, threads);
 }
 
-void product_transposed(const RowBlock& a, const RowBlock& b, MutableRowBlock out) {
+void product_transposed(const RowBlock& a,
+                        const RowBlock& b,
+                        MutableRowBlock out,
+                        Threads threads) {
   VENEER_CHECK(a.cols() == b.cols() && out.rows() == a.rows() && out.cols() == b.rows());
-  gemm(CblasNoTrans, CblasTrans, a.cols(), a, b, 0.0F, out);
+  gemm(CblasNoTrans, CblasTrans, a.cols(), a, b, 0.0F, out, threads);
 }
 
-void add_transposed_product(const RowBlock& a, const RowBlock& b, MutableRowBlock out) {
+void add_transposed_product(const RowBlock& a,
+                            const RowBlock& b,
+                            MutableRowBlock out,
+                            Threads threads) {
   VENEER_CHECK(a.rows() == b.rows() && out.rows() == a.cols() && out.cols() == b.cols());
-  gemm(CblasTrans, CblasNoTrans, a.rows(), a, b, 1.0F, out);
+  gemm(CblasTrans, CblasNoTrans, a.rows(), a, b, 1.0F, out, threads);
 }
 
 std::string blas_description() { return openblas_get_config(); }

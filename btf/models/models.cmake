@@ -4,6 +4,7 @@ set(VENEER_MODEL_SRCS
   material.cc
   model_shader.cc
   models/angular_grid.cc
+  models/cluster_eigenvectors.cc
   models/components.cc
   models/concentric_square.cc
   models/dichromatic_lpca/dichromatic_lpca.cc
@@ -12,11 +13,14 @@ set(VENEER_MODEL_SRCS
   models/lobes/lafortune_lobes.cc
   models/lobes/lobe_fit.cc
   models/local_pca.cc
+  models/local_pca_projection.cc
+  models/local_pca_rows.cc
   models/lpca/lpca.cc
   models/lpca_factors.cc
   models/material_tensors.cc
   models/matrix_product.cc
   models/packed_lpca.cc
+  models/row_clusters.cc
   models/texel_colours/texel_colours.cc)
 set(VENEER_MODEL_TESTS
   models/angular_grid_test.cc

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "btf/communicator.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <string>
+
+namespace veneer::btf {
+namespace {
+
+class Alone final : public Communicator {
+ public:
+  int rank() const override { return 0; }
+  int size() const override { return 1; }
+  void sum(std::span<double>) override {}
+  std::vector<std::byte> gather(std::span<const std::byte> own) override {
+    return {own.begin(), own.end()};
+  }
+};
+
+}  // namespace
+
+Communicator& alone() {
+  static Alone communicator;
+  return communicator;
+}
+
+Status agree(Communicator& ranks, const Status& own) {
+  if (ranks.size() == 1) return own;
+  struct Failure {
+    int rank;
+    Errc code;
+    std::size_t length;
+  };
+  std::vector<Failure> failures;
+  std::string text;
+  if (!own) {
+    failures.push_back({ranks.rank(), own.error().code, own.error().what.size()});
+    text = own.error().what;
+  }
+  failures = gather<Failure>(ranks, failures);
+  const std::vector<char> texts = gather<char>(ranks, text);
+  if (failures.empty()) return {};
+  const Failure& first = failures.front();
+  return fail(
+      first.code,
+      "rank {}: {}",
+      first.rank,
+      std::string(texts.begin(), texts.begin() + static_cast<std::ptrdiff_t>(first.length)));
+}
+
+RowRange rows_of_rank(int rows, const Communicator& ranks) {
+  constexpr std::int64_t kMostAligned = 4096;
+  const std::int64_t share = rows / (std::int64_t{4} * ranks.size());
+  const std::int64_t unit =
+      ranks.size() == 1
+          ? rows
+          : std::min(kMostAligned,
+                     static_cast<std::int64_t>(std::bit_floor(
+                         static_cast<std::uint64_t>(std::max<std::int64_t>(share, 1)))));
+  if (rows == 0) return {};
+  const std::int64_t units = (rows + unit - 1) / unit;
+  const auto start = [&](std::int64_t rank) {
+    return static_cast<int>(std::min<std::int64_t>(rows, units * rank / ranks.size() * unit));
+  };
+  const int first = start(ranks.rank());
+  return {first, start(ranks.rank() + 1) - first};
+}
+
+}  // namespace veneer::btf
