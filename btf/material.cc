@@ -9,6 +9,7 @@
 #include "btf/models/dichromatic_lpca/dichromatic_lpca.h"
 #include "btf/models/lafortune/lafortune.h"
 #include "btf/models/lpca/lpca.h"
+#include "btf/models/revised_lpca/revised_lpca.h"
 #include "btf/models/texel_colours/texel_colours.h"
 
 namespace veneer::btf {
@@ -37,6 +38,12 @@ constexpr std::array kModels{
           false,
           &fit_lpca,
           &load_lpca},
+    Model{"revised-lpca",
+          "RGB Eigen-BRDFs in a volume that the hardware interpolates (Schneider 2004)",
+          1,
+          false,
+          &fit_revised_lpca,
+          &load_revised_lpca},
     Model{"texel-colours",
           "two learned colours a texel, scalar Eigen-BRDFs four to a volume (after Schneider 2004)",
           2,

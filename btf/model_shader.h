@@ -10,7 +10,17 @@ namespace veneer::btf {
 
 /// How a texture that a model's shader reads is laid out; the names are OpenGL's.
 enum class TextureKind { k2D, k2DArray, k3D };
-enum class TexelFormat { kR8ui, kR16ui, kRgba16ui, kRgba32ui, kR16f, kRg16f, kRgba16f, kRgba32f };
+enum class TexelFormat {
+  kR8ui,
+  kR16ui,
+  kRgba16ui,
+  kRgba32ui,
+  kRgba8Snorm,
+  kR16f,
+  kRg16f,
+  kRgba16f,
+  kRgba32f
+};
 [[nodiscard]] std::size_t bytes_per_texel(TexelFormat format);
 
 struct ModelTexture {

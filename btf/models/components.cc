@@ -77,6 +77,14 @@ Result<Precision> parse_precision(std::string_view text,
               name_of(Precision::kFloat16));
 }
 
+Result<Precision> read_precision(const SafetensorsFile& file, std::string_view model) {
+  VENEER_ASSIGN(const std::string text, file.meta("precision"));
+  // What options may leave open, a file may not.
+  const auto precision = parse_precision(text.empty() ? "none" : text, Precision::k8Bit, model);
+  if (precision) return *precision;
+  return fail(Errc::kBadFormat, "reading {}: {}", file.path().string(), precision.error().what);
+}
+
 std::string_view name_of(Precision precision) {
   return precision == Precision::k8Bit ? "8bit" : "float16";
 }

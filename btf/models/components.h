@@ -39,6 +39,8 @@ enum class Precision { k8Bit, kFloat16 };
                                                 Precision otherwise,
                                                 std::string_view model);
 [[nodiscard]] std::string_view name_of(Precision precision);
+/// The metadata entry "precision" of a material. Errors: kBadFormat.
+[[nodiscard]] Result<Precision> read_precision(const SafetensorsFile& file, std::string_view model);
 
 /// "3+1" again.
 [[nodiscard]] std::string format_components(const std::array<int, 2>& components);

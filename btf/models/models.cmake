@@ -5,6 +5,7 @@ set(VENEER_MODEL_SRCS
   model_shader.cc
   models/angular_grid.cc
   models/cluster_eigenvectors.cc
+  models/cluster_volume.cc
   models/components.cc
   models/concentric_square.cc
   models/dichromatic_lpca/dichromatic_lpca.cc
@@ -20,15 +21,20 @@ set(VENEER_MODEL_SRCS
   models/material_tensors.cc
   models/matrix_product.cc
   models/packed_lpca.cc
+  models/packed_texels.cc
+  models/revised_lpca/revised_lpca.cc
   models/row_clusters.cc
   models/texel_colours/texel_colours.cc)
 set(VENEER_MODEL_TESTS
   models/angular_grid_test.cc
+  models/cluster_volume_test.cc
   models/direction_lookup_test.cc
   models/local_pca_test.cc
   models/models_test.cc
-  models/real_material_test.cc)
+  models/real_material_test.cc
+  models/revised_lpca/revised_lpca_test.cc)
 set(VENEER_MODEL_SHADERS
+  models/cluster_volume.glsl
   models/dichromatic_lpca/dichromatic_lpca.glsl
   models/direction_lookup.glsl
   models/elevated_concentric.glsl
