@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -42,6 +43,24 @@ template <class T>
   return {bytes.begin(), bytes.end()};
 }
 
+/// A model whose texels mix values that depend on the directions alone and are few: one set for
+/// each cluster. The renderer may then evaluate these at the nodes of a coarse grid over the
+/// picture and interpolate between them, which leaves a pixel its texel's weights and `layers`
+/// filtered fetches for each light (Sattler et al. 2003, section 5, evaluate so per triangle; here
+/// for clusters).
+///
+/// Where CACHE_NODES or CACHE_PIXELS is defined, `const int kCacheLayers` stands before the source.
+/// With CACHE_NODES the source also defines a type EigenPlace, `EigenPlace eigen_place(vec3
+/// view, vec3 light)` and `void eigen_values(EigenPlace place, int cluster, out vec4
+/// values[layers])`, 0 for lights at and below the horizon. With CACHE_PIXELS it defines
+/// `vec3 btf_radiance_cached(vec2 uv)`, which gets the interpolated values from the renderer's
+/// `vec4 cached_eigen(int cluster, int layer)`.
+struct EigenCache {
+  int clusters = 0;
+  int layers = 0;         ///< of four values, for each cluster
+  int texel_fetches = 0;  ///< of one call of btf_radiance_cached(), without the layers'
+};
+
 /// What the renderer needs to draw a material: GLSL that defines
 /// `vec3 btf_radiance(vec2 uv, vec3 view, vec3 light)` in the sample's unit, and its textures.
 /// `uv` is in repeats of the sample (uv.x = 1 is one width to the right), `view` and `light` are
@@ -49,7 +68,8 @@ template <class T>
 struct ModelShader {
   std::string source;  ///< constants first, no #version
   std::vector<ModelTexture> textures;
-  int fetches = 0;  ///< texture fetches for one call
+  int fetches = 0;                                 ///< texture fetches for one call
+  std::optional<EigenCache> cache = std::nullopt;  ///< for models that offer it
   [[nodiscard]] std::size_t gpu_bytes() const;
 };
 

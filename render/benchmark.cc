@@ -17,6 +17,7 @@
 #include "render/compensate_pass.h"
 #include "render/draw_pass.h"
 #include "render/egl_context.h"
+#include "render/screen_error.h"
 
 namespace veneer::render {
 namespace {
@@ -25,6 +26,11 @@ using Eigen::Vector3d;
 
 constexpr int kPlainTexels = 256;  // along a side of the plain texture
 constexpr int kWarmUpFrames = 2;
+// Frames and pixels that are compared with the set: enough for an epsilon steady to about a
+// percent.
+constexpr int kComparedFrames = 3;
+constexpr int kComparedStep = 7;
+constexpr int kComparedPixels = 20'000;
 const DirectionalLight kLight{Vector3d(0.3, -0.4, -0.9).normalized(),
                               Vector3d::Constant(100.0 * std::numbers::pi)};
 constexpr std::string_view kQueryClock = "GL timer query";
@@ -121,22 +127,27 @@ class Bench {
         "plain",
         plain,
         DrawPass::create_plain(plain, kLight, bench.repeats(kPlainTexels, kPlainTexels), profile)));
-    for (const auto& [name, material] : options.materials) {
+    for (const auto& [name, material, cache] : options.materials) {
       const btf::ModelShader shader = material->shader();
       const Eigen::Vector2d repeats = bench.repeats(material->width(), material->height());
-      VENEER_TRY(bench.add(name, shader, DrawPass::create(shader, {kLight}, repeats, profile)));
+      VENEER_TRY(
+          bench.add(name, shader, DrawPass::create(shader, {kLight}, repeats, profile, cache)));
     }
     bench.entrants_.emplace_back().timing.name = "compensation";
     return bench;
   }
 
-  RenderBenchResult run(int frames, Progress& progress) {
-    progress.start("timing", frames);
-    for (int frame = -kWarmUpFrames; frame < frames; ++frame) {
+  Result<RenderBenchResult> run(const RenderBenchOptions& options, Progress& progress) {
+    progress.start("timing", options.frames);
+    for (int frame = -kWarmUpFrames; frame < options.frames; ++frame) {
       for (Entrant& entrant : entrants_) time(entrant, frame);
       if (frame >= 0) progress.advance();
     }
     progress.finish();
+    for (Entrant& entrant : entrants_)
+      if (entrant.pass && entrant.pass->cache())
+        entrant.timing.served = entrant.pass->cache()->served();
+    if (options.reference != nullptr) VENEER_TRY(compare(*options.reference, progress));
     return summary();
   }
 
@@ -147,12 +158,12 @@ class Bench {
         mesh_(frame_filling_mesh(profile_.geometry)),
         target_(make_texture_2d(GL_RGBA16F, profile_.geometry.width, profile_.geometry.height)),
         depth_(make_texture_2d(
-            GL_DEPTH_COMPONENT32F, profile_.geometry.width, profile_.geometry.height)),
+            GL_DEPTH32F_STENCIL8, profile_.geometry.width, profile_.geometry.height)),
         framebuffer_(make_framebuffer()),
         query_(make_query(GL_TIME_ELAPSED)),
         compensate_(std::move(compensate)) {
     glNamedFramebufferTexture(framebuffer_.id(), GL_COLOR_ATTACHMENT0, target_.id(), 0);
-    glNamedFramebufferTexture(framebuffer_.id(), GL_DEPTH_ATTACHMENT, depth_.id(), 0);
+    glNamedFramebufferTexture(framebuffer_.id(), GL_DEPTH_STENCIL_ATTACHMENT, depth_.id(), 0);
   }
 
   // Texels as large as pixels: as many repeats as it takes to lay the material side by side.
@@ -168,18 +179,69 @@ class Bench {
     entrant.timing.fetches = shader.fetches;
     entrant.timing.gpu_bytes = shader.gpu_bytes();
     entrant.pass = std::move(*pass);
+    if (const AngularCache* cache = entrant.pass->cache()) {
+      entrant.timing.fetches = shader.cache->texel_fetches + shader.cache->layers;
+      entrant.timing.gpu_bytes += cache->gpu_bytes();
+    }
+    return {};
+  }
+
+  static DrawInput input_of(int frame) {
+    DrawInput input;
+    input.eye_in_world = Vector3d(0.2 * std::sin(0.3 * frame), -0.1, -0.2);
+    return input;
+  }
+
+  // What the materials draw at some of the timed frames, against the set.
+  Status compare(const btf::InterpolatedSet& set, Progress& progress) {
+    const btf::SampleSetInfo& info = set.set().info();
+    const auto pixels = static_cast<std::size_t>(profile_.geometry.width) *
+                        static_cast<std::size_t>(profile_.geometry.height);
+    std::vector<Eigen::Vector4f> drawn(pixels);
+    std::vector<ScreenError> errors(entrants_.size());
+    progress.start("comparing on the screen", kComparedFrames);
+    for (int i = 0; i < kComparedFrames; ++i) {
+      const DrawInput input = input_of(kComparedStep * i);
+      VENEER_ASSIGN(const std::vector<ScreenQuery> queries,
+                    probe_screen(mesh_,
+                                 input,
+                                 kLight,
+                                 repeats(info.width, info.height),
+                                 profile_,
+                                 info,
+                                 kComparedPixels));
+      const std::vector<Vector3d> reference = reference_at(set, queries);
+      for (std::size_t e = 1; e + 1 < entrants_.size(); ++e) {
+        entrants_[e].pass->draw(framebuffer_.id(), mesh_, input);
+        glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.id());
+        glPixelStorei(GL_PACK_ALIGNMENT, 4);
+        glPixelStorei(GL_PACK_ROW_LENGTH, 0);
+        glReadPixels(0,
+                     0,
+                     profile_.geometry.width,
+                     profile_.geometry.height,
+                     GL_RGBA,
+                     GL_FLOAT,
+                     drawn.data());
+        add_error(drawn, queries, reference, kLight, errors[e]);
+      }
+      progress.advance();
+    }
+    progress.finish();
+    for (std::size_t e = 1; e + 1 < entrants_.size(); ++e) {
+      entrants_[e].timing.screen_epsilon = errors[e].epsilon();
+      entrants_[e].timing.screen_rmse = errors[e].rmse();
+    }
     return {};
   }
 
   void time(Entrant& entrant, int frame) {
-    DrawInput input;
-    input.eye_in_world = Vector3d(0.2 * std::sin(0.3 * frame), -0.1, -0.2);
+    const DrawInput input = input_of(frame);
     glFinish();
     const auto start = std::chrono::steady_clock::now();
     glBeginQuery(GL_TIME_ELAPSED, query_.id());
     if (entrant.pass) {
-      glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
-      entrant.pass->draw(mesh_, input);
+      entrant.pass->draw(framebuffer_.id(), mesh_, input);
     } else {
       compensate_.run(target_.id(), static_cast<std::uint32_t>(frame));
     }
@@ -243,6 +305,19 @@ Status RenderBenchOptions::check() const {
                 height);
   if (frames < 3 || frames > 10000)
     return fail(Errc::kInvalidOption, "timing: {} frames; 3 to 10000 can be timed", frames);
+  if (reference != nullptr) {
+    for (const RenderBenchMaterial& m : materials) {
+      const btf::SampleSetInfo& info = reference->set().info();
+      if (m.material->width() != info.width || m.material->height() != info.height)
+        return fail(Errc::kInvalidOption,
+                    "timing: {} has {} x {} texels and the set {} x {}; fit it on this set",
+                    m.name,
+                    m.material->width(),
+                    m.material->height(),
+                    info.width,
+                    info.height);
+    }
+  }
   return {};
 }
 
@@ -250,7 +325,7 @@ Result<RenderBenchResult> bench_render(const RenderBenchOptions& options, Progre
   VENEER_TRY(options.check());
   VENEER_ASSIGN(EglContext context, EglContext::create());
   VENEER_ASSIGN(Bench bench, Bench::create(std::move(context), options));
-  return bench.run(options.frames, progress);
+  return bench.run(options, progress);
 }
 
 }  // namespace veneer::render

@@ -3,12 +3,15 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "base/progress.h"
 #include "base/result.h"
+#include "btf/interpolated_set.h"
 #include "btf/material.h"
+#include "render/angular_cache_options.h"
 
 namespace veneer::render {
 
@@ -16,6 +19,7 @@ struct RenderBenchMaterial {
   std::string name;  ///< as it is reported, such as "texel-colours 3+1"
   std::shared_ptr<const btf::Material>
       material;  ///< shared: the caller may time it in several runs
+  AngularCacheOptions cache{};
 };
 
 struct RenderBenchOptions {
@@ -25,6 +29,8 @@ struct RenderBenchOptions {
   /// Timed draws of each material, after two that are not. 3 to 10000.
   int frames = 40;
   std::vector<RenderBenchMaterial> materials{};
+  /// What the materials were fitted on: what they draw is then compared with it, pixel by pixel.
+  const btf::InterpolatedSet* reference = nullptr;
   [[nodiscard]] Status check() const;
 };
 
@@ -33,9 +39,14 @@ struct RenderTiming {
   std::string name;
   double ms_median = 0;
   double ms_p95 = 0;
-  double ratio = 0;  ///< of the medians, to "plain"
-  int fetches = 0;   ///< texture fetches per pixel and light
-  std::size_t gpu_bytes = 0;
+  double ratio = 0;           ///< of the medians, to "plain"
+  int fetches = 0;            ///< texture fetches per pixel and light
+  std::size_t gpu_bytes = 0;  ///< the cache included
+  /// The part of the cells that the angular cache serves; none where it is not used.
+  std::optional<double> served{};
+  /// Of what is drawn against the full set at the pixels' own directions (ScreenError), encoded.
+  std::optional<double> screen_epsilon{};
+  std::optional<double> screen_rmse{};
 };
 
 struct RenderBenchResult {

@@ -13,6 +13,9 @@ namespace {
 constexpr char kFrameGlsl[] =
 #include "render/shaders/frame.glsl.inc"
     ;
+constexpr char kSurfaceGlsl[] =
+#include "render/shaders/surface.glsl.inc"
+    ;
 constexpr char kDrawVert[] =
 #include "render/shaders/draw.vert.inc"
     ;
@@ -73,8 +76,10 @@ Eigen::Matrix4d clip_from_projector(const calibration::ProjectorGeometry& g) {
 
 std::string draw_vertex_source(int light_count) { return header(light_count) + kDrawVert; }
 
+std::string surface_header(int light_count) { return header(light_count) + kSurfaceGlsl; }
+
 std::string draw_fragment_source(const std::string& model_source, int light_count) {
-  return header(light_count) + model_source + "\n" + kDrawFrag;
+  return surface_header(light_count) + model_source + "\n" + kDrawFrag;
 }
 
 std::string plain_fragment_source() { return header(1) + kPlainFrag; }
@@ -107,11 +112,29 @@ Status DrawPass::link(const std::string& fragment_source, const btf::ModelShader
 Result<DrawPass> DrawPass::create(const btf::ModelShader& shader,
                                   std::vector<Light> lights,
                                   const Eigen::Vector2d& texture_repeats,
-                                  const calibration::ProjectorProfile& profile) {
+                                  const calibration::ProjectorProfile& profile,
+                                  const AngularCacheOptions& cache) {
+  VENEER_TRY(cache.check());
   const auto light_count = static_cast<int>(lights.size());
   DrawPass pass(std::move(lights), texture_repeats, profile);
   VENEER_TRY(pass.link(draw_fragment_source(shader.source, light_count), shader));
+  if (cache.spacing > 0 && shader.cache) VENEER_TRY(pass.add_cache(shader, cache));
   return pass;
+}
+
+Status DrawPass::add_cache(const btf::ModelShader& shader, const AngularCacheOptions& options) {
+  const auto light_count = static_cast<int>(lights_.size());
+  VENEER_ASSIGN(cache_, AngularCache::create(shader, light_count, options, width_, height_));
+  VENEER_ASSIGN(
+      cached_program_,
+      link_program({{GL_VERTEX_SHADER, "draw.vert", draw_vertex_source(light_count)},
+                    {GL_FRAGMENT_SHADER,
+                     "draw_cached.frag",
+                     draw_cached_fragment_source(shader, light_count, options.spacing)}}));
+  ModelTextures::assign_units(shader, cached_program_.id());
+  cache_->assign(cached_program_.id());
+  node_uniforms_ = make_buffer(nullptr, sizeof(FrameBlock), GL_DYNAMIC_STORAGE_BIT);
+  return {};
 }
 
 Result<DrawPass> DrawPass::create_plain(const btf::ModelShader& textures,
@@ -123,7 +146,7 @@ Result<DrawPass> DrawPass::create_plain(const btf::ModelShader& textures,
   return pass;
 }
 
-void DrawPass::draw(const MeshBuffers& mesh, const DrawInput& input) const {
+void DrawPass::draw(GLuint framebuffer, const MeshBuffers& mesh, const DrawInput& input) const {
   const RigidTransform object_from_world = input.world_from_object.inverse();
   FrameBlock block;
   block.clip_from_object = (clip_from_world_ * input.world_from_object.matrix()).cast<float>();
@@ -141,18 +164,44 @@ void DrawPass::draw(const MeshBuffers& mesh, const DrawInput& input) const {
   }
   glNamedBufferSubData(uniforms_.id(), 0, sizeof(block), &block);
 
+  if (cache_) {
+    block.clip_from_object =
+        (cache_->nodes_from_clip() * clip_from_world_ * input.world_from_object.matrix())
+            .cast<float>();
+    glNamedBufferSubData(node_uniforms_.id(), 0, sizeof(block), &block);
+    cache_->fill(mesh, textures_, uniforms_.id(), node_uniforms_.id());
+  }
+
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
   glViewport(0, 0, width_, height_);
   glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
   glDisable(GL_BLEND);
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_GREATER);
   glClearDepth(0.0);
+  glClearStencil(0);
   glClearColor(0.0F, 0.0F, 0.0F, 0.0F);
-  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-  glUseProgram(program_.id());
-  glBindBufferBase(GL_UNIFORM_BUFFER, 0, uniforms_.id());
+  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT | GL_STENCIL_BUFFER_BIT);
   textures_.bind();
+  if (cache_) {
+    // What the cache can serve, and then the rest.
+    cache_->bind();
+    glEnable(GL_STENCIL_TEST);
+    glStencilFunc(GL_ALWAYS, 1, 0xFF);
+    glStencilOp(GL_KEEP, GL_KEEP, GL_REPLACE);
+    use(cached_program_);
+    mesh.draw();
+    glStencilFunc(GL_EQUAL, 0, 0xFF);
+    glStencilOp(GL_KEEP, GL_KEEP, GL_KEEP);
+  }
+  use(program_);
   mesh.draw();
+  glDisable(GL_STENCIL_TEST);
+}
+
+void DrawPass::use(const GlProgram& program) const {
+  glUseProgram(program.id());
+  glBindBufferBase(GL_UNIFORM_BUFFER, 0, uniforms_.id());
 }
 
 }  // namespace veneer::render

@@ -5,12 +5,14 @@
 
 #include <Eigen/Core>
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "base/rigid_transform.h"
 #include "btf/model_shader.h"
 #include "calibration/profile.h"
+#include "render/angular_cache.h"
 #include "render/gl_objects.h"
 #include "render/mesh_buffers.h"
 #include "render/model_textures.h"
@@ -27,6 +29,8 @@ inline constexpr double kNearPlane = 0.01;  // metres
 
 /// The sources of the draw program for a model and a number of lights, complete and compilable.
 [[nodiscard]] std::string draw_vertex_source(int light_count);
+/// What fragment shaders of the surface begin with: version, uniforms and surface.glsl.
+[[nodiscard]] std::string surface_header(int light_count);
 [[nodiscard]] std::string draw_fragment_source(const std::string& model_source, int light_count);
 /// The same for the benchmark's yardstick, plain.frag, which reads the texture "Albedo".
 [[nodiscard]] std::string plain_fragment_source();
@@ -37,31 +41,42 @@ struct DrawInput {
   RigidTransform world_from_object;
 };
 
-/// Draws a mesh in a material, as the projector sees it, into an RGBA16F target with depth: XYZ in
-/// cd/m^2 and the geometric factor (draw.frag). Needs a current context, always the same.
+/// Draws a mesh in a material, as the projector sees it, into an RGBA16F target with depth and
+/// stencil: XYZ in cd/m^2 and the geometric factor (surface.glsl). Needs a current context, always
+/// the same.
 class DrawPass {
  public:
   /// Errors: kUnavailable (the driver refuses the shader, a texture is too large).
   [[nodiscard]] static Result<DrawPass> create(const btf::ModelShader& shader,
                                                std::vector<Light> lights,
                                                const Eigen::Vector2d& texture_repeats,
-                                               const calibration::ProjectorProfile& profile);
+                                               const calibration::ProjectorProfile& profile,
+                                               const AngularCacheOptions& cache = {});
   /// The yardstick of the benchmark, for one directional light; `textures` holds "Albedo".
   [[nodiscard]] static Result<DrawPass> create_plain(const btf::ModelShader& textures,
                                                      const DirectionalLight& light,
                                                      const Eigen::Vector2d& texture_repeats,
                                                      const calibration::ProjectorProfile& profile);
-  /// Clears the bound framebuffer and draws. Sets all GL state that it needs.
-  void draw(const MeshBuffers& mesh, const DrawInput& input) const;
+  /// Clears the framebuffer and draws. Sets all GL state that it needs.
+  void draw(GLuint framebuffer, const MeshBuffers& mesh, const DrawInput& input) const;
+  /// Null where every pixel is drawn by itself.
+  [[nodiscard]] const AngularCache* cache() const { return cache_ ? &*cache_ : nullptr; }
 
  private:
   DrawPass(std::vector<Light> lights,
            const Eigen::Vector2d& texture_repeats,
            const calibration::ProjectorProfile& profile);
   [[nodiscard]] Status link(const std::string& fragment_source, const btf::ModelShader& textures);
+  [[nodiscard]] Status add_cache(const btf::ModelShader& shader,
+                                 const AngularCacheOptions& options);
+  void use(const GlProgram& program) const;
   GlProgram program_;
   ModelTextures textures_;
   GlBuffer uniforms_;
+  // The cache, the program that draws from it, and the uniforms with which its nodes are drawn.
+  std::optional<AngularCache> cache_;
+  GlProgram cached_program_;
+  GlBuffer node_uniforms_;
   std::vector<Light> lights_;
   Eigen::Vector2d texture_repeats_;
   Eigen::Matrix4d clip_from_world_;

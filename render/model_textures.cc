@@ -116,13 +116,11 @@ Result<ModelTextures> ModelTextures::upload(const btf::ModelShader& shader, GLui
                 shader.textures.size(),
                 units);
   ModelTextures result;
-  GLint unit = 0;
   for (const ModelTexture& t : shader.textures) {
     VENEER_ASSIGN(GlTexture texture, upload_one(t));
-    // -1, which GL ignores, where the compiler found that the sampler is never read.
-    glProgramUniform1i(program, glGetUniformLocation(program, t.sampler.c_str()), unit++);
     result.textures_.push_back(std::move(texture));
   }
+  assign_units(shader, program);
   if (glGetError() == GL_OUT_OF_MEMORY)
     return fail(
         Errc::kUnavailable,
@@ -130,6 +128,13 @@ Result<ModelTextures> ModelTextures::upload(const btf::ModelShader& shader, GLui
         "clusters or components",
         shader.gpu_bytes() >> 20U);
   return result;
+}
+
+void ModelTextures::assign_units(const btf::ModelShader& shader, GLuint program) {
+  GLint unit = 0;
+  // -1, which GL ignores, where the compiler found that the sampler is never read.
+  for (const ModelTexture& t : shader.textures)
+    glProgramUniform1i(program, glGetUniformLocation(program, t.sampler.c_str()), unit++);
 }
 
 void ModelTextures::bind() const {

@@ -17,6 +17,8 @@ class ModelTextures {
   /// Errors: kUnavailable where one is larger than this GL takes, where there are too many, or
   /// where its memory does not suffice.
   [[nodiscard]] static Result<ModelTextures> upload(const btf::ModelShader& shader, GLuint program);
+  /// The same units for another program of the same material.
+  static void assign_units(const btf::ModelShader& shader, GLuint program);
   void bind() const;
 
  private:

@@ -70,7 +70,8 @@ class GlRenderer final : public Renderer {
                                                   const RendererOptions& options) {
     VENEER_ASSIGN(
         DrawPass draw,
-        DrawPass::create(material.shader(), scene.lights, scene.texture_repeats, profile));
+        DrawPass::create(
+            material.shader(), scene.lights, scene.texture_repeats, profile, options.cache));
     const Compensation compensation(profile, options);
     VENEER_ASSIGN(CompensatePass compensate, CompensatePass::create(compensation, profile));
     auto renderer = std::unique_ptr<GlRenderer>(new GlRenderer(
@@ -78,7 +79,7 @@ class GlRenderer final : public Renderer {
     if (glCheckNamedFramebufferStatus(renderer->target_framebuffer_.id(), GL_FRAMEBUFFER) !=
         GL_FRAMEBUFFER_COMPLETE)
       return fail(Errc::kUnavailable,
-                  "making a renderer: this GL cannot draw to half floats with depth");
+                  "making a renderer: this GL cannot draw to half floats with depth and stencil");
     return renderer;
   }
 
@@ -87,8 +88,7 @@ class GlRenderer final : public Renderer {
   void draw(const FrameInput& input) override {
     context_.make_current();
     timer_.begin();
-    glBindFramebuffer(GL_FRAMEBUFFER, target_framebuffer_.id());
-    draw_.draw(mesh_, {input.eye_in_world, input.world_from_object});
+    draw_.draw(target_framebuffer_.id(), mesh_, {input.eye_in_world, input.world_from_object});
     compensate_.run(target_.id(), input.dither_seed);
     timer_.end();
     glFlush();
@@ -135,12 +135,13 @@ class GlRenderer final : public Renderer {
         height_(geometry.height),
         mesh_(mesh),
         target_(make_texture_2d(GL_RGBA16F, width_, height_)),
-        depth_(make_texture_2d(GL_DEPTH_COMPONENT32F, width_, height_)),
+        depth_(make_texture_2d(GL_DEPTH32F_STENCIL8, width_, height_)),
         target_framebuffer_(make_framebuffer()),
         draw_(std::move(draw)),
         compensate_(std::move(compensate)) {
     glNamedFramebufferTexture(target_framebuffer_.id(), GL_COLOR_ATTACHMENT0, target_.id(), 0);
-    glNamedFramebufferTexture(target_framebuffer_.id(), GL_DEPTH_ATTACHMENT, depth_.id(), 0);
+    glNamedFramebufferTexture(
+        target_framebuffer_.id(), GL_DEPTH_STENCIL_ATTACHMENT, depth_.id(), 0);
   }
 
   // Rows come as they lie in the framebuffer, whose row 0 is the raster's first

@@ -13,6 +13,7 @@
 #include "base/rigid_transform.h"
 #include "btf/material.h"
 #include "calibration/profile.h"
+#include "render/angular_cache_options.h"
 #include "render/scene.h"
 
 namespace veneer::render {
@@ -24,6 +25,7 @@ struct RendererOptions {
   bool dither = true;
   /// Below this G a point is out of the projector's reach and stays black. > 0.
   double geometry_floor = 0.05;
+  AngularCacheOptions cache{};
 };
 
 /// What one frame needs to know.

@@ -273,39 +273,64 @@ ModelShader PackedLpca::shader(std::span<const Eigen::half> colours) const {
   source += kTexelAtGlsl;
   source += kPackedLpcaGlsl;
 
-  source += fmt::format(
-      "void packed_evaluate(vec2 uv, vec3 view, vec3 light, out vec2 scalars, out vec3 "
-      "colours[{}]) {{\n"
-      "  ivec2 texel = texel_at(uv);\n",
-      layout_.colours);
+  // What a texel makes of the scalars, wherever these come from.
+  std::string mix;
+  for (int v = 0; v < volume_count(); ++v)
+    for (int c = 0; c < kScalarsPerVolume && v * kScalarsPerVolume + c < factors_.components; ++c) {
+      const int j = v * kScalarsPerVolume + c;
+      mix += fmt::format("  scalars.{} += {} * eigen[{}].{};\n",
+                         j < layout_.components[0] ? "x" : "y",
+                         lane(j),
+                         v,
+                         "xyzw"[c]);
+    }
+  for (int c = 0; c < layout_.colours; ++c)
+    mix += fmt::format("  colours[{}] = vec3({}, {}, {});\n",
+                       c,
+                       lane(first_colour + 3 * c),
+                       lane(first_colour + 3 * c + 1),
+                       lane(first_colour + 3 * c + 2));
+  std::string fetch = "  ivec2 texel = texel_at(uv);\n";
   for (int w = 0; w < words; ++w)
-    source += fmt::format(
+    fetch += fmt::format(
         "  uvec4 word{0} = texelFetch(PackedTexels, ivec2(texel.x * {1} + {0}, texel.y), 0);\n",
         w,
         words);
-  source += fmt::format("  uint cluster = (word{}.{} >> {}) & 0xffffu;\n",
-                        cluster_lane / kLanesPerWord,
-                        "xyzw"[cluster_lane % kLanesPerWord / 2],
-                        cluster_lane % 2 * 16);
-  source += "  PackedPlace place = packed_place(cluster, view, light);\n  scalars = vec2(0.0);\n";
-  for (int v = 0; v < volume_count(); ++v) {
-    source += fmt::format("  vec4 eigen{0} = packed_fetch(Volume{0}, place);\n", v);
-    for (int c = 0; c < kScalarsPerVolume && v * kScalarsPerVolume + c < factors_.components; ++c) {
-      const int j = v * kScalarsPerVolume + c;
-      source += fmt::format("  scalars.{} += {} * eigen{}.{};\n",
-                            j < layout_.components[0] ? "x" : "y",
-                            lane(j),
-                            v,
-                            "xyzw"[c]);
-    }
-  }
-  for (int c = 0; c < layout_.colours; ++c)
-    source += fmt::format("  colours[{}] = vec3({}, {}, {});\n",
-                          c,
-                          lane(first_colour + 3 * c),
-                          lane(first_colour + 3 * c + 1),
-                          lane(first_colour + 3 * c + 2));
-  source += "}\n";
+  fetch += fmt::format("  uint cluster = (word{}.{} >> {}) & 0xffffu;\n",
+                       cluster_lane / kLanesPerWord,
+                       "xyzw"[cluster_lane % kLanesPerWord / 2],
+                       cluster_lane % 2 * 16);
+  fetch += fmt::format("  scalars = vec2(0.0);\n  vec4 eigen[{}];\n", volume_count());
+  std::string volumes;
+  for (int v = 0; v < volume_count(); ++v)
+    volumes += fmt::format("  eigen[{0}] = packed_fetch(Volume{0}, place);\n", v);
+
+  const std::string results =
+      fmt::format("out vec2 scalars, out vec3 colours[{}]", layout_.colours);
+  source += fmt::format(
+      "void packed_evaluate(vec2 uv, vec3 view, vec3 light, {}) {{\n{}"
+      "  PackedPlace place = packed_place(cluster, view, light);\n{}{}}}\n",
+      results,
+      fetch,
+      volumes,
+      mix);
+  source += fmt::format(
+      "#ifdef CACHE_NODES\n"
+      "struct EigenPlace {{ vec3 view; vec3 light; }};\n"
+      "EigenPlace eigen_place(vec3 view, vec3 light) {{ return EigenPlace(view, light); }}\n"
+      "void eigen_values(EigenPlace at, int cluster, out vec4 eigen[{0}]) {{\n"
+      "  PackedPlace place = packed_place(uint(cluster), at.view, at.light);\n{1}"
+      "  for (int v = 0; v < {0}; ++v) eigen[v] *= at.light.z > 0.0 ? 1.0 : 0.0;\n}}\n#endif\n",
+      volume_count(),
+      volumes);
+  source += fmt::format(
+      "#ifdef CACHE_PIXELS\n"
+      "void packed_cached(vec2 uv, {}) {{\n{}"
+      "  for (int v = 0; v < {}; ++v) eigen[v] = cached_eigen(int(cluster), v);\n{}}}\n#endif\n",
+      results,
+      fetch,
+      volume_count(),
+      mix);
 
   ModelShader shader;
   shader.source = std::move(source);
@@ -322,6 +347,8 @@ ModelShader PackedLpca::shader(std::span<const Eigen::half> colours) const {
     shader.textures.push_back(std::move(volume));
   }
   shader.fetches = words + 2 * volume_count();
+  shader.cache =
+      EigenCache{.clusters = factors_.clusters, .layers = volume_count(), .texel_fetches = words};
   return shader;
 }
 

@@ -67,7 +67,8 @@ class PackedLpca {
   /// @param colours  of texels, three for each colour: [texel][colour][3].
   /// @return GLSL constants and the function
   /// `void packed_evaluate(vec2 uv, vec3 view, vec3 light, out vec2 scalars, out vec3
-  /// colours[count])`, its textures and fetches.
+  /// colours[count])`, its textures and fetches; with CACHE_PIXELS also `packed_cached(uv, scalars,
+  /// colours)` (EigenCache).
   [[nodiscard]] ModelShader shader(std::span<const Eigen::half> colours) const;
 
   static constexpr std::size_t kMostVolumeBytes = std::size_t{2} << 30U;

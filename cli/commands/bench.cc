@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdio>
+#include <optional>
 
 #include "base/exit_code.h"
 #include "btf/material.h"
@@ -38,6 +39,8 @@ struct Candidate {
   std::string_view model;
   std::string_view components;
 };
+constexpr int kIterations = 60;      // where errors count
+constexpr int kRoughIterations = 5;  // where only times do
 constexpr std::array kCandidates{
     Candidate{"lpca", "2"},
     Candidate{"lpca", "4"},
@@ -48,16 +51,33 @@ constexpr std::array kCandidates{
     Candidate{"texel-colours", "6+2"},
 };
 
-/// Every model at the sizes of the literature, fitted to a small synthetic cloth: what a pixel
-/// costs depends on sizes and access patterns, hardly on what the numbers are.
-Result<std::vector<render::RenderBenchMaterial>> fit_candidates(Progress& progress) {
-  std::error_code error;
-  const fs::path temporary = fs::temp_directory_path(error);
-  if (error)
-    return fail(
-        Errc::kIo, "looking for a folder for temporary files: {}; set TMPDIR", error.message());
-  const ScratchFolder scratch(temporary);
-  const fs::path path = scratch.path() / "cloth.btfset";
+/// Every model that the set allows at the sizes of the literature, each also with the cache where
+/// it offers one and one is asked for.
+Result<std::vector<render::RenderBenchMaterial>> fit_candidates(
+    const btf::SampleSet& set,
+    int iterations,
+    const render::AngularCacheOptions& cache,
+    Progress& progress) {
+  std::vector<render::RenderBenchMaterial> materials;
+  for (const Candidate& candidate : kCandidates) {
+    VENEER_ASSIGN(const btf::Model* model, btf::find_model(candidate.model));
+    if (model->polarised && !set.info().polarised) continue;
+    btf::FitOptions options;
+    if (!candidate.components.empty()) options.components = candidate.components;
+    options.iterations = iterations;
+    VENEER_ASSIGN(std::unique_ptr<btf::Material> fitted, model->fit(set, options, progress));
+    const std::shared_ptr<const btf::Material> material = std::move(fitted);
+    const std::string name = fmt::format("{} {}", candidate.model, candidate.components);
+    materials.push_back({name, material});
+    if (cache.spacing > 0 && material->shader().cache)
+      materials.push_back({name + " cached", material, cache});
+  }
+  return materials;
+}
+
+/// A small cloth, for what a pixel costs depends on sizes and access patterns, hardly on what the
+/// numbers are.
+Result<btf::SampleSet> synthesize_cloth(const fs::path& path, Progress& progress) {
   VENEER_ASSIGN(const simulation::HeightFieldMaterial* cloth,
                 simulation::find_height_field_material("cloth"));
   simulation::SynthesisOptions synthesis;
@@ -65,18 +85,7 @@ Result<std::vector<render::RenderBenchMaterial>> fit_candidates(Progress& progre
   synthesis.samples = 1;
   synthesis.bounces = 1;
   VENEER_TRY(simulation::synthesize(*cloth, path, synthesis, progress));
-  VENEER_ASSIGN(const btf::SampleSet set, btf::SampleSet::open(path));
-  std::vector<render::RenderBenchMaterial> materials;
-  for (const Candidate& candidate : kCandidates) {
-    VENEER_ASSIGN(const btf::Model* model, btf::find_model(candidate.model));
-    btf::FitOptions options;
-    options.components = candidate.components;
-    options.iterations = 5;
-    VENEER_ASSIGN(std::unique_ptr<btf::Material> material, model->fit(set, options, progress));
-    materials.push_back(
-        {fmt::format("{} {}", candidate.model, candidate.components), std::move(material)});
-  }
-  return materials;
+  return btf::SampleSet::open(path);
 }
 
 }  // namespace
@@ -85,7 +94,9 @@ Result<int> run_bench(CommandLine& line) {
   std::string what;
   std::string size = "1024x768";
   std::vector<fs::path> files;
+  fs::path set_path;
   render::RenderBenchOptions options;
+  render::AngularCacheOptions cache;
   CLI::App& app = line.app();
   app.add_option("what", what, "render: what drawing a frame costs with each model")
       ->required()
@@ -94,24 +105,53 @@ Result<int> run_bench(CommandLine& line) {
   app.add_option("--frames", options.frames, "Draws of each")->capture_default_str();
   app.add_option(
       "--material", files, "Time these materials, NAME.safetensors, in place of a fixed list");
+  app.add_option("--set",
+                 set_path,
+                 "Fit the fixed list to this sample set, and compare what is drawn with it");
+  app.add_option("--cache",
+                 cache.spacing,
+                 "Time each with an angular cache too, with this many pixels between nodes");
+  app.add_option("--cache-turn", cache.most_turn, "The most that directions may turn between nodes")
+      ->capture_default_str();
   line.parse();
   if (char rest = 0;
       std::sscanf(size.c_str(), "%dx%d%c", &options.width, &options.height, &rest) != 2) {
     return fail(Errc::kInvalidOption, "--size {}: expected WIDTHxHEIGHT, such as 1024x768", size);
   }
 
-  for (const fs::path& file : files) {
-    VENEER_ASSIGN(std::unique_ptr<btf::Material> material, btf::load_material(file));
-    options.materials.push_back({file.stem().string(), std::move(material)});
+  VENEER_TRY(cache.check());
+  std::error_code error;
+  const fs::path temporary = fs::temp_directory_path(error);
+  if (error)
+    return fail(
+        Errc::kIo, "looking for a folder for temporary files: {}; set TMPDIR", error.message());
+  const ScratchFolder scratch(temporary);
+  std::optional<btf::InterpolatedSet> reference;
+  if (!set_path.empty()) {
+    VENEER_ASSIGN(btf::SampleSet set, btf::SampleSet::open(set_path));
+    reference.emplace(std::move(set));
+    options.reference = &*reference;
   }
-  if (files.empty()) {
-    VENEER_ASSIGN(options.materials, fit_candidates(line.progress()));
+  for (const fs::path& file : files) {
+    VENEER_ASSIGN(std::unique_ptr<btf::Material> fitted, btf::load_material(file));
+    const std::shared_ptr<const btf::Material> material = std::move(fitted);
+    options.materials.push_back({file.stem().string(), material});
+    if (cache.spacing > 0 && material->shader().cache)
+      options.materials.push_back({file.stem().string() + " cached", material, cache});
+  }
+  if (files.empty() && reference) {
+    VENEER_ASSIGN(options.materials,
+                  fit_candidates(reference->set(), kIterations, cache, line.progress()));
+  } else if (files.empty()) {
+    VENEER_ASSIGN(const btf::SampleSet set,
+                  synthesize_cloth(scratch.path() / "cloth.btfset", line.progress()));
+    VENEER_ASSIGN(options.materials, fit_candidates(set, kRoughIterations, cache, line.progress()));
   }
   VENEER_ASSIGN(const render::RenderBenchResult result,
                 render::bench_render(options, line.progress()));
   nlohmann::ordered_json json{
       {"renderer", result.renderer}, {"clock", result.clock}, {"size", size}};
-  std::string table = fmt::format("{}, {} ({})\n{:<24} {:>8} {:>8} {:>7} {:>8} {:>9}",
+  std::string table = fmt::format("{}, {} ({})\n{:<28} {:>8} {:>8} {:>7} {:>8} {:>9} {:>9} {:>7}",
                                   result.renderer,
                                   size,
                                   result.clock,
@@ -120,7 +160,9 @@ Result<int> run_bench(CommandLine& line) {
                                   "p95",
                                   "ratio",
                                   "fetches",
-                                  "MB");
+                                  "MB",
+                                  "epsilon",
+                                  "cached");
   for (const render::RenderTiming& t : result.timings) {
     json["results"].push_back({{"name", t.name},
                                {"ms_median", t.ms_median},
@@ -128,13 +170,18 @@ Result<int> run_bench(CommandLine& line) {
                                {"ratio", t.ratio},
                                {"fetches", t.fetches},
                                {"gpu_bytes", t.gpu_bytes}});
-    table += fmt::format("\n{:<24} {:>8.2f} {:>8.2f} {:>7.2f} {:>8} {:>9.1f}",
+    if (t.served) json["results"].back()["served"] = *t.served;
+    if (t.screen_epsilon) json["results"].back()["screen_epsilon"] = *t.screen_epsilon;
+    if (t.screen_rmse) json["results"].back()["screen_rmse"] = *t.screen_rmse;
+    table += fmt::format("\n{:<28} {:>8.2f} {:>8.2f} {:>7.2f} {:>8} {:>9.1f} {:>9} {:>7}",
                          t.name,
                          t.ms_median,
                          t.ms_p95,
                          t.ratio,
                          t.fetches,
-                         static_cast<double>(t.gpu_bytes) / 1e6);
+                         static_cast<double>(t.gpu_bytes) / 1e6,
+                         t.screen_epsilon ? fmt::format("{:.4f}", *t.screen_epsilon) : "",
+                         t.served ? fmt::format("{:.0f} %", 100 * *t.served) : "");
   }
   line.print(json, table);
   return kExitDone;

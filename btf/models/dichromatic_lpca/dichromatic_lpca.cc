@@ -112,6 +112,7 @@ class Dichromatic final : public Material {
         vec3(terms_.specular_colour),
         vec3(terms_.shade_colour));
     shader.source += kGlsl;
+    if (terms_.subtractive) shader.cache.reset();
     return shader;
   }
 

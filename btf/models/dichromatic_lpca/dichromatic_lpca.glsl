@@ -9,3 +9,13 @@ vec3 btf_radiance(vec2 uv, vec3 view, vec3 light) {
                  : scalars.x * colours[0] + specular;
   return light.z > 0.0 ? max(sum, 0.0) : vec3(0.0);
 }
+
+#ifdef CACHE_PIXELS
+// Of the form "ratio": the other adds a constant that fades with the light.
+vec3 btf_radiance_cached(vec2 uv) {
+  vec2 scalars;
+  vec3 colours[1];
+  packed_cached(uv, scalars, colours);
+  return max(scalars.x * colours[0] + scalars.y * kSpecularColour, 0.0);
+}
+#endif

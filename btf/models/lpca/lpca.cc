@@ -163,6 +163,9 @@ ModelShader Lpca::shader() const {
   views_.add_textures("View", shader.textures);
   lights_.add_textures("Light", shader.textures);
   shader.fetches = 1 + layers + 2 * DirectionLookup::kFetches + 9 * components;
+  shader.cache = EigenCache{.clusters = factors_.clusters,
+                            .layers = (3 * components + 3) / 4,
+                            .texel_fetches = 1 + layers};
   return shader;
 }
 

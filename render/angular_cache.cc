@@ -1,0 +1,282 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/angular_cache.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "render/compensate_pass.h"
+#include "render/draw_pass.h"
+
+namespace veneer::render {
+namespace {
+
+constexpr int kGroupSide = 8;  // local size of cache_values.comp
+constexpr int kChunk = 8;      // clusters of one invocation there
+constexpr int kBytesPerValue = 8;
+
+constexpr char kNodesFrag[] =
+#include "render/shaders/cache_nodes.frag.inc"
+    ;
+constexpr char kCellsFrag[] =
+#include "render/shaders/cache_cells.frag.inc"
+    ;
+constexpr char kEdgesVert[] =
+#include "render/shaders/cache_edges.vert.inc"
+    ;
+constexpr char kEdgesFrag[] =
+#include "render/shaders/cache_edges.frag.inc"
+    ;
+constexpr char kValuesComp[] =
+#include "render/shaders/cache_values.comp.inc"
+    ;
+constexpr char kCachedEigenGlsl[] =
+#include "render/shaders/cached_eigen.glsl.inc"
+    ;
+constexpr char kDrawCachedFrag[] =
+#include "render/shaders/draw_cached.frag.inc"
+    ;
+
+int nodes_along(int pixels, int spacing) { return (pixels + spacing - 1) / spacing + 1; }
+
+std::string raster_constants(const CacheRaster& raster) {
+  return fmt::format(
+      "const vec2 kPixels = vec2({}, {});\nconst float kSpacing = {}.0;\n"
+      "const vec2 kCells = vec2({}, {});\n",
+      raster.width,
+      raster.height,
+      raster.spacing,
+      nodes_along(raster.width, raster.spacing) - 1,
+      nodes_along(raster.height, raster.spacing) - 1);
+}
+
+std::string cache_constants(const btf::EigenCache& cache) {
+  return fmt::format(
+      "const int kClusters = {};\nconst int kCacheLayers = {};\n", cache.clusters, cache.layers);
+}
+
+std::string most_turn_constant(double most_turn) {
+  return fmt::format("const float kMostTurn = {:.9g};\n", most_turn);
+}
+
+}  // namespace
+
+Status AngularCacheOptions::check() const {
+  if (spacing != 0 && (spacing < 4 || spacing > 128))
+    return fail(Errc::kInvalidOption,
+                "angular cache: the spacing is {} pixels; it must be 0 (none) or 4 to 128",
+                spacing);
+  if (!(most_turn > 0.0 && most_turn <= 1.0))
+    return fail(Errc::kInvalidOption,
+                "angular cache: most_turn is {}; it must be above 0, at most 1",
+                most_turn);
+  return {};
+}
+
+std::string cache_nodes_fragment_source(int light_count) {
+  return surface_header(light_count) + kNodesFrag;
+}
+
+std::string cache_cells_fragment_source(int light_count, double most_turn) {
+  return surface_header(light_count) + most_turn_constant(most_turn) + kCellsFrag;
+}
+
+std::string cache_edges_vertex_source(int light_count, const CacheRaster& raster) {
+  return surface_header(light_count) + raster_constants(raster) + kEdgesVert;
+}
+
+std::string cache_edges_fragment_source(int light_count,
+                                        const CacheRaster& raster,
+                                        double most_turn) {
+  return surface_header(light_count) + raster_constants(raster) + most_turn_constant(most_turn) +
+         kEdgesFrag;
+}
+
+std::string cache_values_compute_source(const btf::ModelShader& shader) {
+  return "#version 450 core\n#define CACHE_NODES\n" + cache_constants(*shader.cache) +
+         shader.source + kValuesComp;
+}
+
+std::string draw_cached_fragment_source(const btf::ModelShader& shader,
+                                        int light_count,
+                                        int spacing) {
+  return surface_header(light_count) + "#define CACHE_PIXELS\n" + cache_constants(*shader.cache) +
+         fmt::format("const int kCacheLightLayers = {};\nconst float kSpacing = {}.0;\n",
+                     shader.cache->clusters * shader.cache->layers,
+                     spacing) +
+         kCachedEigenGlsl + shader.source + kDrawCachedFrag;
+}
+
+Result<AngularCache> AngularCache::create(const btf::ModelShader& shader,
+                                          int light_count,
+                                          const AngularCacheOptions& options,
+                                          int width,
+                                          int height) {
+  VENEER_CHECK(shader.cache.has_value() && options.spacing > 0);
+  const CacheRaster raster{width, height, options.spacing};
+  AngularCache cache;
+  cache.columns_ = nodes_along(width, options.spacing);
+  cache.rows_ = nodes_along(height, options.spacing);
+  cache.layers_ = light_count * shader.cache->clusters * shader.cache->layers;
+  cache.directions_ = 1 + light_count;
+  cache.groups_z_ = light_count * ((shader.cache->clusters + kChunk - 1) / kChunk);
+  cache.first_unit_ = static_cast<GLuint>(shader.textures.size());
+  cache.scale_x_ = static_cast<double>(width) / options.spacing;
+  cache.scale_y_ = static_cast<double>(height) / options.spacing;
+  GLint most_layers = 0;
+  glGetIntegerv(GL_MAX_ARRAY_TEXTURE_LAYERS, &most_layers);
+  if (cache.layers_ > most_layers)
+    return fail(
+        Errc::kUnavailable,
+        "making the angular cache: {} lights, {} clusters and {} values take {} layers, and "
+        "this GL allows {}; draw without the cache, or fit fewer clusters or components",
+        light_count,
+        shader.cache->clusters,
+        4 * shader.cache->layers,
+        cache.layers_,
+        most_layers);
+  VENEER_ASSIGN(
+      cache.nodes_program_,
+      link_program(
+          {{GL_VERTEX_SHADER, "draw.vert", draw_vertex_source(light_count)},
+           {GL_FRAGMENT_SHADER, "cache_nodes.frag", cache_nodes_fragment_source(light_count)}}));
+  VENEER_ASSIGN(cache.cells_program_,
+                link_program({{GL_VERTEX_SHADER, "fullscreen.vert", fullscreen_vertex_source()},
+                              {GL_FRAGMENT_SHADER,
+                               "cache_cells.frag",
+                               cache_cells_fragment_source(light_count, options.most_turn)}}));
+  VENEER_ASSIGN(
+      cache.edges_program_,
+      link_program(
+          {{GL_VERTEX_SHADER, "cache_edges.vert", cache_edges_vertex_source(light_count, raster)},
+           {GL_FRAGMENT_SHADER,
+            "cache_edges.frag",
+            cache_edges_fragment_source(light_count, raster, options.most_turn)}}));
+  VENEER_ASSIGN(cache.values_program_,
+                link_program({{GL_COMPUTE_SHADER,
+                               "the model in cache_values.comp",
+                               cache_values_compute_source(shader)}}));
+  ModelTextures::assign_units(shader, cache.values_program_.id());
+  glProgramUniform1i(cache.values_program_.id(),
+                     glGetUniformLocation(cache.values_program_.id(), "NodeDirections"),
+                     static_cast<GLint>(cache.first_unit_));
+
+  cache.node_directions_ = make_texture(GL_TEXTURE_2D_ARRAY);
+  glTextureStorage3D(
+      cache.node_directions_.id(), 1, GL_RGBA32F, cache.columns_, cache.rows_, cache.directions_);
+  cache.values_ = make_texture(GL_TEXTURE_2D_ARRAY);
+  glTextureStorage3D(cache.values_.id(), 1, GL_RGBA16F, cache.columns_, cache.rows_, cache.layers_);
+  for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER}) {
+    glTextureParameteri(cache.node_directions_.id(), filter, GL_NEAREST);
+    glTextureParameteri(cache.values_.id(), filter, GL_LINEAR);
+  }
+  for (const GLenum side : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
+    glTextureParameteri(cache.values_.id(), side, GL_CLAMP_TO_EDGE);
+  cache.node_depth_ = make_texture_2d(GL_DEPTH_COMPONENT32F, cache.columns_, cache.rows_);
+  cache.cells_ = make_texture_2d(GL_R8UI, cache.columns_ - 1, cache.rows_ - 1);
+  cache.nodes_framebuffer_ = make_framebuffer();
+  std::array<GLenum, 1 + kMaxLights> attachments{};
+  for (int i = 0; i < cache.directions_; ++i) {
+    const GLenum attachment = GL_COLOR_ATTACHMENT0 + static_cast<GLenum>(i);
+    attachments[static_cast<std::size_t>(i)] = attachment;
+    glNamedFramebufferTextureLayer(
+        cache.nodes_framebuffer_.id(), attachment, cache.node_directions_.id(), 0, i);
+  }
+  glNamedFramebufferDrawBuffers(
+      cache.nodes_framebuffer_.id(), cache.directions_, attachments.data());
+  glNamedFramebufferTexture(
+      cache.nodes_framebuffer_.id(), GL_DEPTH_ATTACHMENT, cache.node_depth_.id(), 0);
+  cache.cells_framebuffer_ = make_framebuffer();
+  glNamedFramebufferTexture(
+      cache.cells_framebuffer_.id(), GL_COLOR_ATTACHMENT0, cache.cells_.id(), 0);
+  cache.no_vertices_ = make_vertex_array();
+  return cache;
+}
+
+Eigen::Matrix4d AngularCache::nodes_from_clip() const {
+  // The raster's pixel X is node X / spacing, whose centre lies half a node further.
+  Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
+  m(0, 0) = scale_x_ / columns_;
+  m(0, 3) = (scale_x_ + 1.0) / columns_ - 1.0;
+  m(1, 1) = scale_y_ / rows_;
+  m(1, 3) = (scale_y_ + 1.0) / rows_ - 1.0;
+  return m;
+}
+
+void AngularCache::fill(const MeshBuffers& mesh,
+                        const ModelTextures& textures,
+                        GLuint frame_block,
+                        GLuint nodes_frame_block) const {
+  glDisable(GL_STENCIL_TEST);
+  glDisable(GL_BLEND);
+  glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+
+  glBindFramebuffer(GL_FRAMEBUFFER, nodes_framebuffer_.id());
+  glViewport(0, 0, columns_, rows_);
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_GREATER);
+  glClearDepth(0.0);
+  glClearColor(0.0F, 0.0F, 0.0F, 0.0F);
+  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  glUseProgram(nodes_program_.id());
+  glBindBufferBase(GL_UNIFORM_BUFFER, 0, nodes_frame_block);
+  mesh.draw();
+  glDisable(GL_DEPTH_TEST);
+
+  glBindFramebuffer(GL_FRAMEBUFFER, cells_framebuffer_.id());
+  glViewport(0, 0, columns_ - 1, rows_ - 1);
+  glBindTextureUnit(0, node_directions_.id());
+  glUseProgram(cells_program_.id());
+  glBindVertexArray(no_vertices_.id());
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glUseProgram(edges_program_.id());
+  glBindBufferBase(GL_UNIFORM_BUFFER, 0, frame_block);
+  glPolygonMode(GL_FRONT_AND_BACK, GL_LINE);
+  mesh.draw();
+  glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+
+  glUseProgram(values_program_.id());
+  textures.bind();
+  glBindTextureUnit(first_unit_, node_directions_.id());
+  glBindImageTexture(0, values_.id(), 0, GL_TRUE, 0, GL_WRITE_ONLY, GL_RGBA16F);
+  const auto groups = [](int nodes) {
+    return static_cast<GLuint>((nodes + kGroupSide - 1) / kGroupSide);
+  };
+  glDispatchCompute(groups(columns_), groups(rows_), static_cast<GLuint>(groups_z_));
+  glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
+  glEnable(GL_DEPTH_TEST);
+}
+
+void AngularCache::bind() const {
+  glBindTextureUnit(first_unit_, values_.id());
+  glBindTextureUnit(first_unit_ + 1, cells_.id());
+}
+
+void AngularCache::assign(GLuint program) const {
+  glProgramUniform1i(
+      program, glGetUniformLocation(program, "CacheValues"), static_cast<GLint>(first_unit_));
+  glProgramUniform1i(
+      program, glGetUniformLocation(program, "CacheCells"), static_cast<GLint>(first_unit_ + 1));
+}
+
+std::size_t AngularCache::gpu_bytes() const {
+  return static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_) *
+         static_cast<std::size_t>(layers_) * kBytesPerValue;
+}
+
+double AngularCache::served() const {
+  std::vector<std::uint8_t> cells(static_cast<std::size_t>(columns_ - 1) *
+                                  static_cast<std::size_t>(rows_ - 1));
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glPixelStorei(GL_PACK_ROW_LENGTH, 0);
+  glGetTextureImage(cells_.id(),
+                    0,
+                    GL_RED_INTEGER,
+                    GL_UNSIGNED_BYTE,
+                    static_cast<GLsizei>(cells.size()),
+                    cells.data());
+  return static_cast<double>(std::ranges::count(cells, 1)) / static_cast<double>(cells.size());
+}
+
+}  // namespace veneer::render

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Internal to render/.
+
+#include <Eigen/Core>
+
+#include <cstddef>
+#include <string>
+
+#include "btf/model_shader.h"
+#include "render/angular_cache_options.h"
+#include "render/gl_objects.h"
+#include "render/mesh_buffers.h"
+#include "render/model_textures.h"
+
+namespace veneer::render {
+
+/// The projector's raster and the pixels between nodes.
+struct CacheRaster {
+  int width;
+  int height;
+  int spacing;
+};
+
+/// The sources of its programs, complete and compilable.
+[[nodiscard]] std::string cache_nodes_fragment_source(int light_count);
+[[nodiscard]] std::string cache_cells_fragment_source(int light_count, double most_turn);
+[[nodiscard]] std::string cache_edges_vertex_source(int light_count, const CacheRaster& raster);
+[[nodiscard]] std::string cache_edges_fragment_source(int light_count,
+                                                      const CacheRaster& raster,
+                                                      double most_turn);
+[[nodiscard]] std::string cache_values_compute_source(const btf::ModelShader& shader);
+/// draw.frag's stand-in where the cache serves.
+[[nodiscard]] std::string draw_cached_fragment_source(const btf::ModelShader& shader,
+                                                      int light_count,
+                                                      int spacing);
+
+/// What depends on directions alone in a clustered model, evaluated at nodes every few pixels and
+/// interpolated between them by the texture units. Node (i, j) lies at the corner (i, j) * spacing
+/// of the raster's pixels.
+///
+/// Directions in the local frame change slowly over a smooth surface, texels from pixel to pixel;
+/// so the error is that of linear interpolation over the turn between two nodes, which is bounded:
+/// a cell serves only where its four nodes see the surface, where no direction turns by more than
+/// most_turn between them, and where every vertex of the mesh inside it has the directions that its
+/// nodes tell. Other cells (silhouettes, seams of the tangents, tight curvature) are drawn per
+/// pixel. Hidden edges count too, which costs cells but no accuracy. Needs a current context,
+/// always the same.
+class AngularCache {
+ public:
+  /// @param shader  with a cache.
+  /// Errors: kUnavailable (the driver refuses a shader, too many layers).
+  [[nodiscard]] static Result<AngularCache> create(const btf::ModelShader& shader,
+                                                   int light_count,
+                                                   const AngularCacheOptions& options,
+                                                   int width,
+                                                   int height);
+  /// Turns the raster's clip coordinates into the nodes'.
+  [[nodiscard]] Eigen::Matrix4d nodes_from_clip() const;
+  /// Evaluates the nodes and decides on the cells. Uniform buffers hold the block Frame, once with
+  /// clip_from_object and once with nodes_from_clip() before it. Changes framebuffer, viewport,
+  /// program, texture and stencil bindings; leaves depth testing on.
+  void fill(const MeshBuffers& mesh,
+            const ModelTextures& textures,
+            GLuint frame_block,
+            GLuint nodes_frame_block) const;
+  /// Binds what draw_cached.frag reads, after the textures of the model.
+  void bind() const;
+  /// Tells a program that draws from the cache which units those are.
+  void assign(GLuint program) const;
+  [[nodiscard]] std::size_t gpu_bytes() const;
+  /// The part of all cells that serve, of the last fill(). Waits for the GPU; for tests and
+  /// reports.
+  [[nodiscard]] double served() const;
+
+ private:
+  int columns_ = 0;  // of nodes
+  int rows_ = 0;
+  int layers_ = 0;      // of values
+  int directions_ = 0;  // a view and lights
+  int groups_z_ = 0;
+  GLuint first_unit_ = 0;
+  double scale_x_ = 0;  // columns of nodes over the raster
+  double scale_y_ = 0;
+  GlProgram nodes_program_;
+  GlProgram cells_program_;
+  GlProgram edges_program_;
+  GlProgram values_program_;
+  GlTexture node_directions_;
+  GlTexture node_depth_;
+  GlTexture cells_;
+  GlTexture values_;
+  GlFramebuffer nodes_framebuffer_;
+  GlFramebuffer cells_framebuffer_;
+  GlVertexArray no_vertices_;
+};
+
+}  // namespace veneer::render

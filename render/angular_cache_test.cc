@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render/angular_cache.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "render/compensation.h"
+#include "render/draw_pass.h"
+#include "render/egl_context.h"
+#include "render/internal_glslang.h"
+#include "render/internal_testing.h"
+
+namespace veneer::render {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::Vector4f;
+
+constexpr int kWidth = 320;
+constexpr int kHeight = 240;
+// Half floats of the values, of their products and of the target.
+constexpr double kHalfFloats = 3e-3;
+
+const DirectionalLight kSun{Vector3d(0.3, 0.4, 0.85).normalized(),
+                            Vector3d::Constant(std::numbers::pi)};
+const PointLight kLamp{{0.2, -0.1, 0.5}, {0.6, 0.4, 0.3}};
+
+// Two clusters, chosen by texel, of smooth functions of both directions with slopes up to 1: the
+// sample is what the cache interpolates, so that its error is the interpolation's alone.
+btf::ModelShader smooth_model() {
+  btf::ModelShader shader;
+  shader.source = R"(
+vec3 smooth_values(int cluster, vec3 view, vec3 light) {
+  vec3 value = 0.5 + 0.25 * vec3(view.x + light.y, view.y - light.x, view.z * light.z);
+  return light.z > 0.0 ? (cluster == 0 ? value : value.zxy) : vec3(0.0);
+}
+int cluster_at(vec2 uv) { return int(floor(uv.x * 40.0) + floor(uv.y * 40.0)) & 1; }
+vec3 btf_radiance(vec2 uv, vec3 view, vec3 light) {
+  return smooth_values(cluster_at(uv), view, light);
+}
+#ifdef CACHE_NODES
+struct EigenPlace { vec3 view; vec3 light; };
+EigenPlace eigen_place(vec3 view, vec3 light) { return EigenPlace(view, light); }
+void eigen_values(EigenPlace place, int cluster, out vec4 values[kCacheLayers]) {
+  values[0] = vec4(smooth_values(cluster, place.view, place.light).xy, 0.0, 0.0);
+  values[1] = vec4(smooth_values(cluster, place.view, place.light).z);
+}
+#endif
+#ifdef CACHE_PIXELS
+vec3 btf_radiance_cached(vec2 uv) {
+  int cluster = cluster_at(uv);
+  return vec3(cached_eigen(cluster, 0).xy, cached_eigen(cluster, 1).w);
+}
+#endif
+)";
+  shader.cache = btf::EigenCache{.clusters = 2, .layers = 2, .texel_fetches = 0};
+  return shader;
+}
+
+class AngularCacheTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    auto context = EglContext::create();
+    if (!context) GTEST_SKIP() << context.error().what;
+    context_.emplace(std::move(*context));
+    target_ = make_texture_2d(GL_RGBA32F, kWidth, kHeight);
+    depth_ = make_texture_2d(GL_DEPTH32F_STENCIL8, kWidth, kHeight);
+    framebuffer_ = make_framebuffer();
+    glNamedFramebufferTexture(framebuffer_.id(), GL_COLOR_ATTACHMENT0, target_.id(), 0);
+    glNamedFramebufferTexture(framebuffer_.id(), GL_DEPTH_STENCIL_ATTACHMENT, depth_.id(), 0);
+  }
+
+  struct Drawn {
+    std::vector<Vector4f> pixels;
+    double served = 0;  // of all cells
+  };
+
+  Drawn draw(const Mesh& mesh,
+             const std::vector<Light>& lights,
+             const AngularCacheOptions& options) {
+    const MeshBuffers buffers(mesh);
+    const auto pass = DrawPass::create(smooth_model(), lights, {1, 1}, profile_, options);
+    EXPECT_TRUE(pass) << pass.error().what;
+    Drawn drawn;
+    drawn.pixels.resize(kWidth * kHeight);
+    DrawInput input;
+    input.eye_in_world = {-0.4, 0.3, 0.9};
+    // Twice: nothing may be left over from the frame before.
+    for (int i = 0; i < 2; ++i) pass->draw(framebuffer_.id(), buffers, input);
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.id());
+    glReadPixels(0, 0, kWidth, kHeight, GL_RGBA, GL_FLOAT, drawn.pixels.data());
+    if (pass->cache() != nullptr) drawn.served = pass->cache()->served();
+    return drawn;
+  }
+
+  static double largest_difference(const Drawn& a, const Drawn& b) {
+    double largest = 0;
+    for (std::size_t i = 0; i < a.pixels.size(); ++i) {
+      // Both cover the same pixels.
+      EXPECT_EQ(a.pixels[i][3], b.pixels[i][3]) << i % kWidth << ", " << i / kWidth;
+      largest = std::max(largest, double((a.pixels[i] - b.pixels[i]).cwiseAbs().maxCoeff()));
+    }
+    return largest;
+  }
+
+  std::optional<EglContext> context_;
+  GlTexture target_;
+  GlTexture depth_;
+  GlFramebuffer framebuffer_;
+  calibration::ProjectorProfile profile_ = example_profile(kWidth, kHeight, 8);
+};
+
+// The error of linear interpolation of a function with bounded second derivative over a turn t: t^2
+// / 8 along each of two sides, for values of slope 1/4 a direction (two directions, XYZ up to 1.1
+// times RGB).
+double interpolation_bound(double turn) { return 0.5 * turn * turn + kHalfFloats; }
+
+TEST_F(AngularCacheTest, FollowsThePerPixelDrawWithinTheBoundOfInterpolation) {
+  for (const char* name : {"plate", "sphere", "vase"}) {
+    const Mesh mesh = *load_mesh(name);
+    for (const std::vector<Light>& lights : {std::vector<Light>{kSun}, {kSun, kLamp}}) {
+      const Drawn exact = draw(mesh, lights, {});
+      const Drawn cached = draw(mesh, lights, {.spacing = 4, .most_turn = 0.2});
+      const double bound = static_cast<double>(lights.size()) * 3.0 * interpolation_bound(0.2);
+      EXPECT_LT(largest_difference(exact, cached), bound) << name;
+      EXPECT_GT(cached.served, 0.01) << name << ": nothing was tested";
+    }
+  }
+}
+
+TEST_F(AngularCacheTest, DrawsPixelByPixelWhereDirectionsTurnTooFast) {
+  const Mesh sphere = *load_mesh("sphere");
+  const Drawn exact = draw(sphere, {kSun}, {});
+  const Drawn none = draw(sphere, {kSun}, {.spacing = 4, .most_turn = 1e-6});
+  EXPECT_EQ(none.served, 0.0);
+  EXPECT_EQ(largest_difference(exact, none), 0.0);
+  const Drawn wide = draw(sphere, {kSun}, {.spacing = 4, .most_turn = 0.3});
+  const Drawn narrow = draw(sphere, {kSun}, {.spacing = 4, .most_turn = 0.15});
+  EXPECT_GT(wide.served, narrow.served);
+  EXPECT_GT(narrow.served, 0.0);
+}
+
+// A plate with a ridge that is narrower than a cell and lies between two columns of nodes.
+TEST_F(AngularCacheTest, SeesWhatCurvesBetweenItsNodes) {
+  Mesh ridge;
+  constexpr int kColumns = 200;
+  for (int j = 0; j <= 1; ++j) {
+    for (int i = 0; i <= kColumns; ++i) {
+      const double x = -0.1 + 0.2 * i / kColumns;
+      const bool steep = i == kColumns / 2;
+      ridge.positions.emplace_back(x, -0.1 + 0.2 * j, 0.0);
+      ridge.normals.push_back(steep ? Vector3d(0.7, 0.0, 0.7).normalized() : Vector3d::UnitZ());
+      ridge.texture_coordinates.emplace_back(x / 0.2 + 0.5, 1.0 - j);
+    }
+  }
+  for (std::uint32_t i = 0; i < kColumns; ++i) {
+    const std::uint32_t above = i + kColumns + 1;
+    ridge.triangles.push_back({i, i + 1, above + 1});
+    ridge.triangles.push_back({i, above + 1, above});
+  }
+  const Drawn exact = draw(ridge, {kSun}, {});
+  const Drawn cached = draw(ridge, {kSun}, {.spacing = 16, .most_turn = 0.1});
+  EXPECT_LT(largest_difference(exact, cached), 3.0 * interpolation_bound(0.1));
+  EXPECT_GT(cached.served, 0.02);
+}
+
+TEST_F(AngularCacheTest, NodesLieAtTheCornersOfPixels) {
+  const auto cache = AngularCache::create(smooth_model(), 1, {.spacing = 16}, kWidth, kHeight);
+  ASSERT_TRUE(cache) << cache.error().what;
+  const Eigen::Matrix4d m = cache->nodes_from_clip();
+  constexpr int kColumns = kWidth / 16 + 1;
+  // Pixel corner X is the centre of node X / 16.
+  for (const int x : {0, 16, 160, 320}) {
+    const double ndc = 2.0 * x / kWidth - 1.0;
+    const Eigen::Vector4d clip = m * Eigen::Vector4d(3.0 * ndc, 0.0, 1.0, 3.0);
+    EXPECT_NEAR((clip.x() / clip.w() + 1.0) / 2.0 * kColumns, x / 16.0 + 0.5, 1e-12);
+  }
+}
+
+TEST(AngularCacheOptions, AreChecked) {
+  EXPECT_TRUE(AngularCacheOptions{}.check());
+  EXPECT_TRUE((AngularCacheOptions{.spacing = 16}.check()));
+  EXPECT_FALSE((AngularCacheOptions{.spacing = 3}.check()));
+  EXPECT_FALSE((AngularCacheOptions{.spacing = 129}.check()));
+  EXPECT_FALSE((AngularCacheOptions{.spacing = 16, .most_turn = 0.0}.check()));
+  EXPECT_FALSE((AngularCacheOptions{.spacing = 16, .most_turn = NAN}.check()));
+}
+
+TEST(AngularCacheShaders, AreValidByTheReferenceCompiler) {
+  if (!has_glslang()) GTEST_SKIP() << "glslangValidator absent: install glslang-tools";
+  for (const int lights : {1, kMaxLights}) {
+    EXPECT_EQ(glslang_complaints(cache_nodes_fragment_source(lights), "frag"), "");
+    EXPECT_EQ(glslang_complaints(cache_cells_fragment_source(lights, 0.1), "frag"), "");
+    EXPECT_EQ(glslang_complaints(cache_edges_vertex_source(lights, {64, 48, 16}), "vert"), "");
+    EXPECT_EQ(glslang_complaints(cache_edges_fragment_source(lights, {64, 48, 16}, 0.1), "frag"),
+              "");
+    EXPECT_EQ(glslang_complaints(draw_cached_fragment_source(smooth_model(), lights, 16), "frag"),
+              "");
+  }
+  EXPECT_EQ(glslang_complaints(cache_values_compute_source(smooth_model()), "comp"), "");
+}
+
+}  // namespace
+}  // namespace veneer::render

@@ -1,0 +1,23 @@
+// draw.frag with the directions' part read from the cache (angular_cache.h), where a cell has one.
+in Surface {
+  vec3 position;
+  vec3 normal;
+  vec3 tangent;
+  vec2 uv;
+} surface;
+
+layout(location = 0) out vec4 target;
+
+void main() {
+  vec2 place = gl_FragCoord.xy / kSpacing;
+  if (texelFetch(CacheCells, ivec2(place), 0).r == 0u) discard;
+  cache_place = (place + 0.5) / vec2(textureSize(CacheValues, 0).xy);
+
+  vec3 rgb = vec3(0.0);
+  for (int i = 0; i < LIGHT_COUNT; ++i) {
+    cache_layer = i * kCacheLightLayers;
+    rgb += btf_radiance_cached(surface.uv) *
+           (frame.light_rgb[i].rgb * light_at(i, surface.position).w);
+  }
+  target = target_of(rgb, projector_geometry(normalize(surface.normal), surface.position));
+}

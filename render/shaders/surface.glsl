@@ -1,0 +1,34 @@
+// What a point of the surface knows of eye, lights and projector; everything in the object's frame.
+
+// A direction times this is in the local frame: z along the normal, x along the tangent.
+mat3 local_frame(vec3 normal, vec3 tangent) {
+  vec3 x = normalize(tangent - dot(tangent, normal) * normal);
+  return mat3(x, cross(normal, x), normal);
+}
+
+vec3 view_at(vec3 position) { return normalize(frame.eye.xyz - position); }
+
+// The direction to a light, and in w what arrives of its light_rgb.
+vec4 light_at(int i, vec3 position) {
+  vec4 light = frame.lights[i];
+  vec3 to_light = light.xyz - light.w * position;
+  float closeness = 1.0 / dot(to_light, to_light);  // 1 for a direction
+  return vec4(to_light * sqrt(closeness), mix(1.0, closeness, light.w));
+}
+
+// cos(theta_p) (r_ref / r)^2 of the projector's light.
+float projector_geometry(vec3 normal, vec3 position) {
+  vec3 to_projector = frame.projector.xyz - position;
+  float nearness = 1.0 / dot(to_projector, to_projector);
+  return dot(normal, to_projector) * sqrt(nearness) * (frame.projector.w * nearness);
+}
+
+// The largest half float: brighter is drawn as this, not as infinity.
+const float kHalfMax = 65504.0;
+
+// What the draw passes leave: XYZ in cd/m^2, and in alpha the geometric factor; all 0 where the
+// surface faces away from the projector.
+vec4 target_of(vec3 rgb, float geometry) {
+  return geometry > 0.0 ? min(vec4(mat3(frame.xyz_from_rgb) * rgb, geometry), vec4(kHalfMax))
+                        : vec4(0.0);
+}
