@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -54,6 +55,10 @@ class BinaryReader {
   /// The next bytes, as many as the product of `counts`. Errors: as read().
   [[nodiscard]] Result<std::span<const std::byte>> take(std::initializer_list<std::uint64_t> counts,
                                                         std::string_view what);
+  /// At most `count` of the next bytes, which stay to be read.
+  [[nodiscard]] std::span<const std::byte> peek(std::size_t count) const {
+    return rest_.first(std::min(count, rest_.size()));
+  }
   [[nodiscard]] std::uint64_t position() const { return size_ - rest_.size(); }
   [[nodiscard]] std::uint64_t remaining() const { return rest_.size(); }
   /// Errors: kBadFormat where bytes are left.

@@ -9,6 +9,7 @@
 #include "btf/importers/crop.h"
 #include "btf/importers/merl/merl.h"
 #include "btf/importers/rti/rti.h"
+#include "btf/importers/ubo2014/ubo2014.h"
 #include "btf/importers/utia/utia.h"
 
 namespace veneer::btf {
@@ -20,6 +21,7 @@ constexpr std::array kImporters{
              &import_btfbase},
     Importer{"merl", "an isotropic BRDF of the MERL database (.binary)", &import_merl},
     Importer{"rti", "a fixed camera and many lights: a .lp file and its pictures", &import_rti},
+    Importer{"ubo2014", "a BTF of the University of Bonn (.btf)", &import_ubo2014},
     Importer{"utia", "an anisotropic BRDF of the UTIA database (.bin)", &import_utia},
 };
 static_assert(std::ranges::is_sorted(kImporters, {}, &Importer::name));

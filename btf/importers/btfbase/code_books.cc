@@ -50,8 +50,9 @@ class NumberReader {
 Result<fs::path> find_table(const fs::path& folder, const std::string& ending) {
   std::vector<fs::path> found;
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder, error)) {
-    if (entry.path().filename().string().ends_with(ending)) found.push_back(entry.path());
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (entry->path().filename().string().ends_with(ending)) found.push_back(entry->path());
   }
   if (error)
     return fail(Errc::kNotFound, "reading code-books {}: {}", folder.string(), error.message());

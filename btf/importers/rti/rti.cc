@@ -44,8 +44,9 @@ Result<fs::path> find_lp(const fs::path& source) {
   std::error_code error;
   if (fs::is_regular_file(source, error)) return source;
   std::vector<fs::path> found;
-  for (const auto& entry : fs::directory_iterator(source, error)) {
-    if (lower(entry.path().extension().string()) == ".lp") found.push_back(entry.path());
+  for (fs::directory_iterator entry(source, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (lower(entry->path().extension().string()) == ".lp") found.push_back(entry->path());
   }
   if (error) return fail(Errc::kNotFound, "importing {}: {}", source.string(), error.message());
   if (found.empty())
@@ -159,9 +160,10 @@ Result<std::vector<fs::path>> find_pictures(const fs::path& folder,
                                             const std::vector<Photo>& photos) {
   std::multimap<std::string, fs::path> by_stem;
   std::error_code error;
-  for (const auto& entry : fs::recursive_directory_iterator(folder, error)) {
-    if (is_picture(entry.path()))
-      by_stem.emplace(lower(entry.path().stem().string()), entry.path());
+  for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (is_picture(entry->path()))
+      by_stem.emplace(lower(entry->path().stem().string()), entry->path());
   }
   if (error) return fail(Errc::kIo, "importing {}: {}", folder.string(), error.message());
   std::vector<fs::path> paths;
