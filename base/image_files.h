@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/image.h"
@@ -26,6 +27,10 @@ inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 28;
 [[nodiscard]] Result<Image<Rgb16>> read_png16(const std::filesystem::path& path);
 /// A baseline or progressive JPEG as 8-bit RGB.
 [[nodiscard]] Result<Image<Rgb8>> read_jpeg(const std::filesystem::path& path);
+/// The same from a file's bytes, which lie in an archive for example.
+/// @param name  for messages.
+[[nodiscard]] Result<Image<Rgb8>> decode_jpeg(std::string_view bytes,
+                                              const std::filesystem::path& name);
 
 /// One named float channel of an OpenEXR image, such as "R" or "specular.R".
 struct ExrChannel {

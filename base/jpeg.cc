@@ -44,10 +44,17 @@ struct Decoder {
   ~Decoder() { jpeg_destroy_decompress(&info); }
 };
 
-// libjpeg reports errors by longjmp, so these three hold no C++ objects.
+// libjpeg reports errors by longjmp, so these hold no C++ objects.
 bool read_header(Decoder& decoder, std::FILE* file) {
   if (setjmp(decoder.handler.escape) != 0) return false;
   jpeg_stdio_src(&decoder.info, file);
+  jpeg_read_header(&decoder.info, TRUE);
+  return true;
+}
+
+bool read_header(Decoder& decoder, const char* data, std::size_t size) {
+  if (setjmp(decoder.handler.escape) != 0) return false;
+  jpeg_mem_src(&decoder.info, reinterpret_cast<const unsigned char*>(data), size);
   jpeg_read_header(&decoder.info, TRUE);
   return true;
 }
@@ -70,17 +77,8 @@ bool read_rows(Decoder& decoder, ImageView<Rgb8> image) {
   return true;
 }
 
-}  // namespace
-
-Result<Image<Rgb8>> read_jpeg(const std::filesystem::path& path) {
-  const std::unique_ptr<std::FILE, CloseFile> file(std::fopen(path.c_str(), "rb"));
-  if (!file)
-    return fail(
-        Errc::kNotFound, "reading {}: there is no such file, or it may not be read", path.string());
-  Decoder decoder;
-  if (!read_header(decoder, file.get())) {
-    return fail(Errc::kBadFormat, "reading {}: {}", path.string(), decoder.handler.message);
-  }
+// What follows the header.
+Result<Image<Rgb8>> read_rest(Decoder& decoder, const std::filesystem::path& path) {
   // Before begin(): of a progressive picture it allocates all coefficients.
   VENEER_TRY(check_image_size(path, decoder.info.image_width, decoder.info.image_height));
   if (!begin(decoder)) {
@@ -97,6 +95,28 @@ Result<Image<Rgb8>> read_jpeg(const std::filesystem::path& path) {
         Errc::kBadFormat, "reading {}: the file is damaged or was cut short", path.string());
   }
   return image;
+}
+
+}  // namespace
+
+Result<Image<Rgb8>> read_jpeg(const std::filesystem::path& path) {
+  const std::unique_ptr<std::FILE, CloseFile> file(std::fopen(path.c_str(), "rb"));
+  if (!file)
+    return fail(
+        Errc::kNotFound, "reading {}: there is no such file, or it may not be read", path.string());
+  Decoder decoder;
+  if (!read_header(decoder, file.get())) {
+    return fail(Errc::kBadFormat, "reading {}: {}", path.string(), decoder.handler.message);
+  }
+  return read_rest(decoder, path);
+}
+
+Result<Image<Rgb8>> decode_jpeg(std::string_view bytes, const std::filesystem::path& name) {
+  Decoder decoder;
+  if (!read_header(decoder, bytes.data(), bytes.size())) {
+    return fail(Errc::kBadFormat, "reading {}: {}", name.string(), decoder.handler.message);
+  }
+  return read_rest(decoder, name);
 }
 
 }  // namespace veneer

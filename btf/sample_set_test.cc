@@ -58,6 +58,28 @@ TEST(SampleSet, RoundTrip) {
   EXPECT_TRUE(set.check_finite());
 }
 
+// File names may hold any bytes; what is written must be read again.
+TEST(SampleSet, ASourceThatIsNoUtf8IsMended) {
+  const std::string mark = "\xef\xbf\xbd";
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {"\x7f \xc3\xa4 \xe2\x82\xac \xf0\x9f\x8e\xa8",
+       "\x7f \xc3\xa4 \xe2\x82\xac \xf0\x9f\x8e\xa8"},
+      {"w\xf6lle", "w" + mark + "lle"},  // Latin-1
+      {"\xc3", mark},                    // cut short
+      {"\xe2\x82", mark + mark},
+      {"\xc0\xaf", mark + mark},  // longer than needed
+      {"\xe0\x80\xaf", mark + mark + mark},
+      {"\xed\xa0\x80", mark + mark + mark},             // a surrogate
+      {"\xf4\x90\x80\x80", mark + mark + mark + mark},  // beyond Unicode
+      {"\x80\xff", mark + mark}};
+  for (const auto& [bytes, expected] : cases) {
+    const TemporaryFolder folder;
+    SampleSetInfo info = small_info();
+    info.source = bytes;
+    EXPECT_EQ(testing::make_set(folder.path() / "a.btfset", info, pattern).info().source, expected);
+  }
+}
+
 TEST(SampleSet, TotalOfAPolarisedSetIsTheSumOfItsParts) {
   const TemporaryFolder folder;
   const SampleSet set = testing::make_set(folder.path() / "a.btfset", small_info(true), pattern);

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "base/files.h"
@@ -10,11 +11,39 @@
 namespace veneer::btf {
 namespace {
 
-// A TOML basic string.
+// How many bytes the UTF-8 character at the beginning takes, 0 where none begins there (Unicode
+// 15.0, table 3-7: neither longer than needed, nor a surrogate, nor beyond U+10FFFF).
+std::size_t utf8_length(std::string_view text) {
+  const auto byte = [text](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char first = byte(0);
+  if (first < 0x80) return 1;
+  const std::size_t length = first < 0xc2   ? 0
+                             : first < 0xe0 ? 2
+                             : first < 0xf0 ? 3
+                             : first < 0xf5 ? 4
+                                            : 0;
+  if (length == 0 || length > text.size()) return 0;
+  for (std::size_t i = 1; i < length; ++i) {
+    if ((byte(i) & 0xc0) != 0x80) return 0;
+  }
+  const unsigned char second = byte(1);
+  const bool too_long = (first == 0xe0 && second < 0xa0) || (first == 0xf0 && second < 0x90);
+  const bool outside = (first == 0xed && second > 0x9f) || (first == 0xf4 && second > 0x8f);
+  return too_long || outside ? 0 : length;
+}
+
+// A TOML basic string. Bytes that are no UTF-8, as in file names of old archives, become the
+// replacement character.
 std::string toml_string(std::string_view text) {
   std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
+  while (!text.empty()) {
+    const std::size_t length = utf8_length(text);
+    const char c = text.front();
+    if (length == 0) {
+      result += "\xef\xbf\xbd";
+    } else if (length > 1) {
+      result += text.substr(0, length);
+    } else if (c == '"' || c == '\\') {
       result += '\\';
       result += c;
     } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
@@ -22,6 +51,7 @@ std::string toml_string(std::string_view text) {
     } else {
       result += c;
     }
+    text.remove_prefix(std::max<std::size_t>(length, 1));
   }
   return result + '"';
 }

@@ -13,6 +13,7 @@ find_package(assimp REQUIRED)
 find_package(embree 3 REQUIRED)
 find_package(CLI11 REQUIRED)
 pkg_check_modules(OPENEXR REQUIRED IMPORTED_TARGET OpenEXR)
+pkg_check_modules(LIBZIP REQUIRED IMPORTED_TARGET libzip)
 pkg_check_modules(LCMS2 REQUIRED IMPORTED_TARGET lcms2)
 pkg_check_modules(EPOXY REQUIRED IMPORTED_TARGET epoxy)
 # The generic names that OpenBLAS also provides: a machine may have ATLAS behind them, which is six

@@ -9,6 +9,7 @@
 #include "btf/importers/crop.h"
 #include "btf/importers/merl/merl.h"
 #include "btf/importers/rti/rti.h"
+#include "btf/importers/ubo2003/ubo2003.h"
 #include "btf/importers/ubo2014/ubo2014.h"
 #include "btf/importers/utia/utia.h"
 
@@ -21,6 +22,9 @@ constexpr std::array kImporters{
              &import_btfbase},
     Importer{"merl", "an isotropic BRDF of the MERL database (.binary)", &import_merl},
     Importer{"rti", "a fixed camera and many lights: a .lp file and its pictures", &import_rti},
+    Importer{"ubo2003",
+             "a BTF of the University of Bonn as pictures (UBO2003, ATRIUM: a zip or a folder)",
+             &import_ubo2003},
     Importer{"ubo2014", "a BTF of the University of Bonn (.btf)", &import_ubo2014},
     Importer{"utia", "an anisotropic BRDF of the UTIA database (.bin)", &import_utia},
 };
