@@ -7,20 +7,6 @@
 #include <string>
 
 namespace veneer::btf {
-namespace {
-
-class Alone final : public Communicator {
- public:
-  int rank() const override { return 0; }
-  int size() const override { return 1; }
-  void sum(std::span<double>) override {}
-  std::vector<std::byte> gather(std::span<const std::byte> own) override {
-    return {own.begin(), own.end()};
-  }
-};
-
-}  // namespace
-
 Communicator& alone() {
   static Alone communicator;
   return communicator;

@@ -14,6 +14,7 @@
 #include "base/progress.h"
 #include "base/result.h"
 #include "base/safetensors.h"
+#include "btf/communicator.h"
 #include "btf/direction.h"
 #include "btf/model_shader.h"
 #include "btf/sample_set.h"
@@ -45,6 +46,9 @@ struct FitOptions {
   /// Lloyd iterations at most, from each start and after each swap of clusters.
   int iterations = 60;
   std::uint64_t seed = 1;
+  /// Who fits: every rank calls fit() with the same set and options, and all get the whole
+  /// material. More than one only where Model::over_ranks. Borrowed for the call.
+  Communicator* ranks = &alone();
   /// Errors: kInvalidOption, naming the option and what it may be.
   [[nodiscard]] Status check() const;
 };
@@ -97,6 +101,7 @@ struct Model {
                                            const FitOptions& options,
                                            Progress& progress);
   Result<std::unique_ptr<Material>> (*load)(const SafetensorsFile& file);
+  bool over_ranks = false;  ///< fit() shares the work among FitOptions::ranks
 };
 
 /// Every model, sorted by name.

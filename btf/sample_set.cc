@@ -208,17 +208,20 @@ void SampleSet::rgb(int texel, Part part, std::span<float> out) const {
   }
 }
 
-Status SampleSet::check_finite() const {
+Status SampleSet::check_finite() const { return check_finite(0, info_->texel_count()); }
+
+Status SampleSet::check_finite(int first, int count) const {
+  VENEER_CHECK(first >= 0 && count >= 0 && count <= info_->texel_count() - first);
   std::atomic<std::int64_t> total = 0;
   std::mutex mutex;
   int first_texel = info_->texel_count();
-  parallel_for(info_->texel_count(), 16, [&](std::int64_t begin, std::int64_t end) {
-    for (std::int64_t texel = begin; texel < end; ++texel) {
-      const std::int64_t count = count_non_finite(stored(static_cast<int>(texel)));
-      if (count == 0) continue;
-      total += count;
+  parallel_for(count, 16, [&](std::int64_t begin, std::int64_t end) {
+    for (auto texel = static_cast<int>(first + begin); texel < first + end; ++texel) {
+      const std::int64_t found = count_non_finite(stored(texel));
+      if (found == 0) continue;
+      total += found;
       const std::lock_guard lock(mutex);
-      first_texel = std::min(first_texel, static_cast<int>(texel));
+      first_texel = std::min(first_texel, texel);
     }
   });
   if (total == 0) return {};

@@ -59,6 +59,8 @@ class SampleSet {
   /// Looks at every sample once. Errors: kBadFormat where one is NaN or infinite, with the texel
   /// and pair of the first and how many there are. Fits call it before they start.
   [[nodiscard]] Status check_finite() const;
+  /// The same of the texels [first, first + count).
+  [[nodiscard]] Status check_finite(int first, int count) const;
 
  private:
   SampleSet(std::filesystem::path path,

@@ -132,7 +132,10 @@ class EigenvectorFit {
         product_transposed(part, vectors, weights);
         RowMatrix sum = RowMatrix::Zero(vectors.rows(), vectors.cols());
         add_transposed_product(weights, part, sum);
-        mixed[i + p] += sum.cast<double>();
+        parallel_for(sum.rows(), 1, [&](std::int64_t begin, std::int64_t end) {
+          mixed[i + p].middleRows(begin, end - begin) +=
+              sum.middleRows(begin, end - begin).cast<double>();
+        });
       }
     });
     return mixed;

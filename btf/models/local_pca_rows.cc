@@ -33,6 +33,14 @@ void read_rows(const RowSource& source, std::span<const int> rows, RowMatrix& bl
       });
 }
 
+std::size_t block_length(std::span<const int> rows, std::size_t first) {
+  const std::size_t most = std::min<std::size_t>(rows.size() - first, kBlockRows);
+  const int chunk = rows[first] / kChunkRows;
+  std::size_t length = 1;
+  while (length < most && rows[first + length] / kChunkRows == chunk) ++length;
+  return length;
+}
+
 void sum_over_ranks(std::span<DoubleRowMatrix> matrices, Communicator& ranks) {
   if (ranks.size() == 1) return;
   std::vector<double> all;

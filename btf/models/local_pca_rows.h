@@ -35,16 +35,21 @@ void orthonormalise_rows(RowMatrix& rows);
 /// Reads the rows `rows`, on all threads, into the top of `block`.
 void read_rows(const RowSource& source, std::span<const int> rows, RowMatrix& block);
 
+/// How many of the rows at `first` and after, which ascend, make the next block: kBlockRows at most
+/// and all of one chunk.
+[[nodiscard]] std::size_t block_length(std::span<const int> rows, std::size_t first);
+
 /// Calls body(block, first) for successive blocks of the listed rows: rows[first] and those after.
 template <class Body>
 void for_each_block(const RowSource& source,
                     std::span<const int> rows,
                     RowMatrix& block,
                     Body body) {
-  for (std::size_t first = 0; first < rows.size(); first += kBlockRows) {
-    const auto part = rows.subspan(first, std::min<std::size_t>(kBlockRows, rows.size() - first));
-    read_rows(source, part, block);
-    body(block.topRows(static_cast<Eigen::Index>(part.size())), static_cast<int>(first));
+  for (std::size_t first = 0; first < rows.size();) {
+    const std::size_t length = block_length(rows, first);
+    read_rows(source, rows.subspan(first, length), block);
+    body(block.topRows(static_cast<Eigen::Index>(length)), static_cast<int>(first));
+    first += length;
   }
 }
 

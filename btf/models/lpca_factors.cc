@@ -66,6 +66,11 @@ LpcaFactors factors_of(const LocalPca& pca) {
   return factors;
 }
 
+Status check_samples(const SampleSet& set, const FitOptions& options) {
+  const RowRange own = rows_of_rank(set.info().texel_count(), *options.ranks);
+  return agree(*options.ranks, set.check_finite(own.first, own.count));
+}
+
 LpcaFactors fit_factors(const RowSource& source,
                         const std::vector<int>& components,
                         const FitOptions& options,
@@ -76,7 +81,8 @@ LpcaFactors fit_factors(const RowSource& source,
                                    .basis = options.basis,
                                    .iterations = options.iterations,
                                    .seed = options.seed},
-                                  progress));
+                                  progress,
+                                  *options.ranks));
 }
 
 void add_factors(const LpcaFactors& factors, int texels, Material::Contents& contents) {

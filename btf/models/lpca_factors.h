@@ -27,7 +27,11 @@ struct LpcaFactors {
 /// @param pca  all parts with the same number of columns.
 [[nodiscard]] LpcaFactors factors_of(const LocalPca& pca);
 
-/// Fits rows of one part for each of `components` and brings them to the stored form.
+/// SampleSet::check_finite() of what each of options.ranks will read, with one outcome for all.
+[[nodiscard]] Status check_samples(const SampleSet& set, const FitOptions& options);
+
+/// Fits rows of one part for each of `components`, shared among options.ranks, and brings them to
+/// the stored form.
 [[nodiscard]] LpcaFactors fit_factors(const RowSource& source,
                                       const std::vector<int>& components,
                                       const FitOptions& options,

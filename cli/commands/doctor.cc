@@ -5,6 +5,7 @@
 #include "base/parallel.h"
 #include "btf/models/matrix_product.h"
 #include "cli/commands/commands.h"
+#include "cli/ranks/ranks.h"
 #include "render/egl_context.h"
 
 namespace veneer::cli {
@@ -14,13 +15,17 @@ Result<int> run_doctor(CommandLine& line) {
   const Result<render::EglContext> egl = render::EglContext::create();
   const std::string gl = egl ? egl->description() : egl.error().what;
   const std::string blas = btf::blas_description();
-  line.print(
-      {{"gl", gl}, {"gl_usable", egl.has_value()}, {"blas", blas}, {"threads", thread_count()}},
-      fmt::format("OpenGL   {}{}\nBLAS     {}\nthreads  {}",
-                  egl ? "" : "not usable: ",
-                  gl,
-                  blas,
-                  thread_count()));
+  line.print({{"gl", gl},
+              {"gl_usable", egl.has_value()},
+              {"blas", blas},
+              {"mpi", mpi_description()},
+              {"threads", thread_count()}},
+             fmt::format("OpenGL   {}{}\nBLAS     {}\nMPI      {}\nthreads  {}",
+                         egl ? "" : "not usable: ",
+                         gl,
+                         blas,
+                         mpi_description(),
+                         thread_count()));
   return egl ? kExitDone : kExitFailed;
 }
 

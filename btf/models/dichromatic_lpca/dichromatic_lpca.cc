@@ -4,7 +4,7 @@
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
-#include <mutex>
+#include <array>
 
 #include "base/parallel.h"
 #include "btf/models/components.h"
@@ -152,31 +152,34 @@ DirectionRole beyond(bool subtractive) {
   return subtractive ? DirectionRole::kView : DirectionRole::kLight;
 }
 
-// Looks at all samples once: the reference, the colours and how many texels are masked.
+// Looks at all samples once, each rank at its own: the reference, the colours and how many texels
+// are masked.
 Terms find_terms(const SampleSet& set,
                  bool subtractive,
                  std::vector<Eigen::half>& reference,
+                 Communicator& ranks,
                  Progress& progress) {
   const SampleSetInfo& info = set.info();
   const int reference_pair = nearest_normal(info.views) * static_cast<int>(info.lights.size()) +
                              nearest_normal(info.lights);
   const auto pairs = static_cast<Eigen::Index>(info.pair_count());
-  reference.resize(static_cast<std::size_t>(info.texel_count()) * 3);
+  const RowRange own = rows_of_rank(info.texel_count(), ranks);
+  reference.resize(static_cast<std::size_t>(own.count) * 3);
   // One texel's share at a place of its own, so that the sum has one order whatever the threads do.
-  std::vector<Eigen::Matrix3d> specular(static_cast<std::size_t>(info.texel_count()));
+  std::vector<Eigen::Matrix3d> specular(static_cast<std::size_t>(own.count));
   std::vector<Eigen::Matrix3d> shade(specular.size());
-  progress.start("colours", info.texel_count());
-  parallel_for(info.texel_count(), 16, [&](std::int64_t begin, std::int64_t end) {
+  progress.start("colours", own.count);
+  parallel_for(own.count, 16, [&](std::int64_t begin, std::int64_t end) {
     std::vector<float> rgb(static_cast<std::size_t>(pairs) * 3);
     const Samples samples(rgb.data(), pairs, 3);
-    for (auto texel = static_cast<int>(begin); texel < end; ++texel) {
-      const auto index = static_cast<std::size_t>(texel);
-      set.rgb(texel, Part::kDiffuse, rgb);
+    for (auto i = static_cast<int>(begin); i < end; ++i) {
+      const auto index = static_cast<std::size_t>(i);
+      set.rgb(own.first + i, Part::kDiffuse, rgb);
       const Eigen::RowVector3f here = samples.row(reference_pair);
-      Eigen::Map<Half3>(reference.data() + 3 * texel) = here.transpose().cast<Eigen::half>();
+      Eigen::Map<Half3>(reference.data() + 3 * i) = here.transpose().cast<Eigen::half>();
       const Eigen::MatrixX3d taken = (samples.rowwise() - here).cast<double>();
       shade[index] = taken.transpose() * taken;
-      set.rgb(texel, Part::kSpecular, rgb);
+      set.rgb(own.first + i, Part::kSpecular, rgb);
       const Eigen::MatrixX3d shine = samples.cast<double>();
       specular[index] = shine.transpose() * shine;
     }
@@ -184,15 +187,18 @@ Terms find_terms(const SampleSet& set,
   });
   Terms terms;
   terms.subtractive = subtractive;
-  Eigen::Matrix3d specular_sum = Eigen::Matrix3d::Zero();
-  Eigen::Matrix3d shade_sum = Eigen::Matrix3d::Zero();
-  for (int i = 0; i < info.texel_count(); ++i) {
-    specular_sum += specular[static_cast<std::size_t>(i)];
-    shade_sum += shade[static_cast<std::size_t>(i)];
-    if (!subtractive && colour_at(reference, i).norm() < kNoise) ++terms.masked_texels;
+  // Of the specular parts, of the shading.
+  std::array<Eigen::Matrix3d, 2> sums{Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Zero()};
+  for (std::size_t i = 0; i < specular.size(); ++i) {
+    sums[0] += specular[i];
+    sums[1] += shade[i];
   }
-  terms.specular_colour = best_colour(specular_sum);
-  terms.shade_colour = best_colour(shade_sum);
+  for (Eigen::Matrix3d& sum : sums) ranks.sum({sum.data(), 9});
+  terms.specular_colour = best_colour(sums[0]);
+  terms.shade_colour = best_colour(sums[1]);
+  reference = gather<Eigen::half>(ranks, reference);
+  for (int i = 0; i < info.texel_count() && !subtractive; ++i)
+    if (colour_at(reference, i).norm() < kNoise) ++terms.masked_texels;
   progress.finish(terms.masked_texels == 0
                       ? std::string()
                       : fmt::format("{} texels too dark", terms.masked_texels));
@@ -229,10 +235,10 @@ Result<std::unique_ptr<Material>> fit_dichromatic_lpca(const SampleSet& set,
                                   .beyond = beyond(subtractive),
                                   .colours = kColours};
   VENEER_TRY(PackedLpca::check(frame, layout, options.clusters, Errc::kInvalidOption, "fit"));
-  VENEER_TRY(set.check_finite());
+  VENEER_TRY(check_samples(set, options));
 
   std::vector<Eigen::half> reference;
-  const Terms terms = find_terms(set, subtractive, reference, progress);
+  const Terms terms = find_terms(set, subtractive, reference, *options.ranks, progress);
   const auto read = [&](int texel, std::span<float> shading, std::span<float> specular) {
     std::vector<float> rgb(3 * shading.size());
     const Samples samples(rgb.data(), frame.pair_count(), 3);

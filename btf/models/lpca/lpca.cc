@@ -180,7 +180,7 @@ Result<std::unique_ptr<Material>> fit_lpca(const SampleSet& set,
   VENEER_ASSIGN(const int components, parse_one_term(options.components, kName));
   MaterialFrame frame = frame_of(set.info());
   VENEER_TRY(check_textures(frame, components, Errc::kInvalidOption, "fit"));
-  VENEER_TRY(set.check_finite());
+  VENEER_TRY(check_samples(set, options));
   RowSource source;
   source.rows = frame.texel_count();
   source.part_columns = {frame.pair_count() * 3};

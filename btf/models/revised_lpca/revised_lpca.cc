@@ -276,7 +276,7 @@ Result<std::unique_ptr<Material>> fit_revised_lpca(const SampleSet& set,
   layout.angular = options.angular;
   MaterialFrame frame = frame_of(set.info());
   VENEER_TRY(layout.check(frame, options.clusters, Errc::kInvalidOption, "fit"));
-  VENEER_TRY(set.check_finite());
+  VENEER_TRY(check_samples(set, options));
   RowSource source;
   source.rows = frame.texel_count();
   source.part_columns = {frame.pair_count() * 3};

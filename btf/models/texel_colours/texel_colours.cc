@@ -7,6 +7,7 @@
 
 #include "base/parallel.h"
 #include "btf/models/components.h"
+#include "btf/models/lpca_factors.h"
 #include "btf/models/packed_lpca.h"
 
 namespace veneer::btf {
@@ -111,20 +112,22 @@ Result<std::unique_ptr<Material>> fit_texel_colours(const SampleSet& set,
   const PackedLpca::Layout layout{
       .components = components, .angular = options.angular, .colours = kColours};
   VENEER_TRY(PackedLpca::check(frame, layout, options.clusters, Errc::kInvalidOption, "fit"));
-  VENEER_TRY(set.check_finite());
+  VENEER_TRY(check_samples(set, options));
   const auto values = static_cast<std::size_t>(frame.pair_count()) * 3;
 
-  progress.start("colours", frame.texel_count());
-  std::vector<Eigen::half> colours(static_cast<std::size_t>(frame.texel_count()) * kColours * 3);
-  parallel_for(frame.texel_count(), 16, [&](std::int64_t begin, std::int64_t end) {
+  const RowRange own = rows_of_rank(frame.texel_count(), *options.ranks);
+  progress.start("colours", own.count);
+  std::vector<Eigen::half> colours(static_cast<std::size_t>(own.count) * kColours * 3);
+  parallel_for(own.count, 16, [&](std::int64_t begin, std::int64_t end) {
     std::vector<float> rgb(values);
-    for (auto texel = static_cast<int>(begin); texel < end; ++texel) {
-      set.rgb(texel, Part::kTotal, rgb);
-      Eigen::Map<HalfBasis>(colours.data() + 3 * kColours * texel) =
+    for (auto i = static_cast<int>(begin); i < end; ++i) {
+      set.rgb(own.first + i, Part::kTotal, rgb);
+      Eigen::Map<HalfBasis>(colours.data() + 3 * kColours * i) =
           colour_basis(Samples(rgb.data(), frame.pair_count(), 3)).cast<Eigen::half>();
     }
     progress.advance(end - begin);
   });
+  colours = gather<Eigen::half>(*options.ranks, colours);
   progress.finish();
 
   const auto read = [&](int texel, std::span<float> first, std::span<float> second) {
