@@ -107,6 +107,9 @@ TEST_F(ProgramsTest, MissingFilesAreNamed) {
                     "nothing.safetensors"));
   EXPECT_TRUE(fails(run("veneerd --config nothing.toml"), 1, "nothing.toml"));
   EXPECT_TRUE(fails(run("veneer import rti nothing.lp -o " + text("x")), 1, "nothing.lp"));
+  ASSERT_TRUE(write_text(at("short.binary"), "no table"));
+  EXPECT_TRUE(fails(
+      run("veneer import merl " + text("short.binary") + " -o " + text("x")), 1, "short.binary"));
   EXPECT_FALSE(fs::exists(at("x")));
 }
 

@@ -24,10 +24,15 @@ Result<int> run_import(CommandLine& line) {
       .add_option("--crop", crop, "Keep only the texels x,y,width,height")
       ->delimiter(',')
       ->expected(4);
+  btf::ImportOptions options;
+  line.app()
+      .add_option("--directions",
+                  options.directions,
+                  "Where to sample a BRDF (merl, utia): bonn81 or ubo151")
+      ->capture_default_str();
   line.parse();
 
   VENEER_ASSIGN(const btf::Importer* importer, btf::find_importer(name));
-  btf::ImportOptions options;
   if (!crop.empty()) options.crop = btf::Crop{crop[0], crop[1], crop[2], crop[3]};
   VENEER_TRY(importer->run(source, out, options, line.progress()));
   VENEER_ASSIGN(const btf::SampleSet set, btf::SampleSet::open(out));
