@@ -25,8 +25,10 @@ namespace veneer::btf {
 /// within 0.05 for a real RTI dome, 0.25 at worst and 0.0003 in the mean for 200 random directions.
 ///
 /// A light's scale beyond the border takes cos(theta_border) linear between the border's
-/// directions, which is exact where these form a ring. This class is what both the shader and its
-/// double-precision counterpart use. Thread-safe.
+/// directions, which is exact where these form a ring, and the border's least cosine in its
+/// triangles. On scattered sets, whose border goes up and down, it may be off: for
+/// the lights of that dome by 3e-5 in the mean, but by up to 0.31 at single directions. This class
+/// is what both the shader and its double-precision counterpart use. Thread-safe.
 class DirectionLookup {
  public:
   static constexpr int kSide = 256;

@@ -168,6 +168,33 @@ TEST(DirectionLookup, LightsFadeWithTheCosineBeyondTheData) {
   }
 }
 
+// Exact where the border is a ring; else cosines are mixed along a border that goes up and down.
+TEST(DirectionLookup, LightsFadeNearlyAsInTheReferenceOnScatteredSets) {
+  struct Bound {
+    double worst, mean;
+  };
+  const std::map<std::string, Bound> most{{"bonn", {1e-6, 1e-7}},
+                                          {"lion", {0.35, 1e-4}},
+                                          {"patch", {0.03, 3e-4}},
+                                          {"scattered", {0.15, 5e-5}}};
+  constexpr int kSamples = 50000;
+  for (const auto& [name, directions] : irregular_sets()) {
+    const DirectionLookup lookup(directions, DirectionRole::kLight);
+    const SphericalInterpolator reference(directions, DirectionRole::kLight);
+    Pcg32 random(4);
+    double worst = 0.0;
+    double mean = 0.0;
+    for (int i = 0; i < kSamples; ++i) {
+      const Direction d = random_direction(random, 1e-3);
+      const double off = std::abs(lookup.weights(d).scale - reference.weights(d).scale);
+      worst = std::max(worst, off);
+      mean += off / kSamples;
+    }
+    EXPECT_LT(worst, most.at(name).worst) << name;
+    EXPECT_LT(mean, most.at(name).mean) << name;
+  }
+}
+
 TEST(DirectionLookup, AgreesForSetsWithoutTrianglesOrNotAroundTheNormal) {
   const DirectionSet bonn = bonn_directions();
   const std::map<std::string, DirectionSet> sets{
