@@ -42,6 +42,5 @@ set(VENEER_MODEL_SHADERS
   models/lobes/lafortune_lobes.glsl
   models/lobes/lobes.glsl
   models/lpca/lpca.glsl
-  models/packed_lpca.glsl
   models/texel_at.glsl
   models/texel_colours/texel_colours.glsl)

@@ -2,20 +2,15 @@
 #include "btf/models/packed_lpca.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstring>
 
 #include "base/parallel.h"
 #include "btf/models/components.h"
+#include "btf/models/packed_texels.h"
 
 namespace veneer::btf {
 namespace {
 
-// Every GL 4.5 takes volumes of this many texels a side.
-constexpr int kMostVolumeSide = 2048;
 constexpr int kScalarsPerVolume = 4;
-// 16-bit lanes of one RGBA32UI texel.
-constexpr int kLanesPerWord = 8;
 
 constexpr char kElevatedConcentricGlsl[] =
 #include "btf/models/elevated_concentric.glsl.inc"
@@ -23,8 +18,8 @@ constexpr char kElevatedConcentricGlsl[] =
 constexpr char kTexelAtGlsl[] =
 #include "btf/models/texel_at.glsl.inc"
     ;
-constexpr char kPackedLpcaGlsl[] =
-#include "btf/models/packed_lpca.glsl.inc"
+constexpr char kClusterVolumeGlsl[] =
+#include "btf/models/cluster_volume.glsl.inc"
     ;
 
 int volumes_for(const PackedLpca::Components& components) {
@@ -35,8 +30,8 @@ int volumes_for(const PackedLpca::Components& components) {
 int cluster_lane_of(const PackedLpca::Layout& layout) {
   return volumes_for(layout.components) * kScalarsPerVolume + 3 * layout.colours;
 }
-int words_for(const PackedLpca::Layout& layout) {
-  return cluster_lane_of(layout) / kLanesPerWord + 1;
+PackedTexels texels_of(const PackedLpca::Layout& layout) {
+  return PackedTexels(cluster_lane_of(layout) + 1);
 }
 
 // As the constructor will lay them out, without the padding of clusters to whole rows.
@@ -47,15 +42,6 @@ double volume_bytes(const MaterialFrame& frame, const PackedLpca::Layout& layout
          static_cast<double>(bytes_per_texel(TexelFormat::kRgba16f));
 }
 
-// Lanes 0, 1 are the low and high half of the first uint, and so on.
-std::string lane(int index) {
-  constexpr std::string_view kNames = "xyzw";
-  return fmt::format("unpackHalf2x16(word{}.{}).{}",
-                     index / kLanesPerWord,
-                     kNames[static_cast<std::size_t>(index % kLanesPerWord / 2)],
-                     kNames[static_cast<std::size_t>(index % 2)]);
-}
-
 }  // namespace
 
 Status PackedLpca::check(const MaterialFrame& frame,
@@ -63,19 +49,9 @@ Status PackedLpca::check(const MaterialFrame& frame,
                          int clusters,
                          Errc code,
                          std::string_view doing) {
-  VENEER_TRY(check_texture("the texels",
-                           static_cast<std::int64_t>(frame.width) * words_for(layout),
-                           frame.height,
-                           code,
-                           doing));
-  const double bytes = volume_bytes(frame, layout, std::min(clusters, frame.texel_count()));
-  if (bytes <= double(kMostVolumeBytes)) return {};
-  return fail(code,
-              "{}: the volumes would take {:.1f} GiB on the GPU, over {:.0f} GiB; choose fewer "
-              "clusters, fewer components or a smaller angular",
-              doing,
-              bytes / (1U << 30U),
-              double(kMostVolumeBytes) / (1U << 30U));
+  VENEER_TRY(texels_of(layout).check(frame, code, doing));
+  return ClusterVolume::check(
+      volume_bytes(frame, layout, std::min(clusters, frame.texel_count())), code, doing);
 }
 
 Result<PackedLpca> PackedLpca::fit(const MaterialFrame& frame,
@@ -101,24 +77,16 @@ PackedLpca::PackedLpca(MaterialFrame frame, Layout layout, LpcaFactors factors)
       layout_(layout),
       factors_(std::move(factors)),
       views_(frame_.views, DirectionRole::kView, layout.angular),
-      lights_(frame_.lights, layout.beyond, layout.angular) {
+      lights_(frame_.lights, layout.beyond, layout.angular),
+      place_(factors_.clusters, views_.nodes(), lights_.nodes(), 1) {
   fill_volumes();
 }
 
 int PackedLpca::volume_count() const { return volumes_for(layout_.components); }
 
 void PackedLpca::fill_volumes() {
-  const int a = views_.nodes();
-  const int b = lights_.nodes();
-  while ((1 << cluster_shift_) < factors_.clusters && (2 << cluster_shift_) * a <= kMostVolumeSide)
-    ++cluster_shift_;
-  const int across = 1 << cluster_shift_;
-  width_ = across * a;
-  height_ = (factors_.clusters + across - 1) / across * a;
   volumes_.assign(static_cast<std::size_t>(volume_count()),
-                  std::vector<Eigen::half>(static_cast<std::size_t>(width_) *
-                                           static_cast<std::size_t>(height_) *
-                                           static_cast<std::size_t>(b * b) * kScalarsPerVolume));
+                  std::vector<Eigen::half>(place_.texel_count() * kScalarsPerVolume));
   parallel_for(factors_.clusters, 1, [&](std::int64_t begin, std::int64_t end) {
     for (auto k = static_cast<int>(begin); k < end; ++k) {
       for (int j = 0; j < factors_.components; ++j) {
@@ -132,16 +100,11 @@ void PackedLpca::fill_volumes() {
         const RowMatrix nodes = lights_.fill() * (views_.fill() * measured).transpose();
         std::vector<Eigen::half>& volume =
             volumes_[static_cast<std::size_t>(j / kScalarsPerVolume)];
-        for (int z = 0; z < b * b; ++z)
-          for (int v = 0; v < a * a; ++v) {
-            const int x = k % across * a + v % a;
-            const int y = k / across * a + v / a;
-            const auto texel = (static_cast<std::size_t>(z) * static_cast<std::size_t>(height_) +
-                                static_cast<std::size_t>(y)) *
-                                   static_cast<std::size_t>(width_) +
-                               static_cast<std::size_t>(x);
+        for (Eigen::Index l = 0; l < nodes.rows(); ++l)
+          for (Eigen::Index v = 0; v < nodes.cols(); ++v) {
+            const std::size_t texel = place_.texel(k, 0, static_cast<int>(v), static_cast<int>(l));
             volume[texel * kScalarsPerVolume + static_cast<std::size_t>(j % kScalarsPerVolume)] =
-                saturated_half(nodes(z, v));
+                saturated_half(nodes(l, v));
           }
       }
     }
@@ -189,19 +152,13 @@ Eigen::Vector2d PackedLpca::evaluate(int texel,
                                      const Direction& light) const {
   const GridWeights v = views_.weights(view);
   const GridWeights l = lights_.weights(light);
-  const int a = views_.nodes();
   const int k = factors_.cluster[static_cast<std::size_t>(texel)];
-  const int x0 = (k & ((1 << cluster_shift_) - 1)) * a;
-  const int y0 = (k >> cluster_shift_) * a;
   const std::span<const Eigen::half> weight = factors_.weights_of(texel);
   Eigen::Vector2d scalars = Eigen::Vector2d::Zero();
   for (std::size_t i = 0; i < 4; ++i) {
     if (l.weight[i] == 0.0) continue;
     for (std::size_t n = 0; n < 4; ++n) {
-      const auto at = (static_cast<std::size_t>(l.node[i]) * static_cast<std::size_t>(height_) +
-                       static_cast<std::size_t>(y0 + v.node[n] / a)) *
-                          static_cast<std::size_t>(width_) +
-                      static_cast<std::size_t>(x0 + v.node[n] % a);
+      const std::size_t at = place_.texel(k, 0, v.node[n], l.node[i]);
       for (int j = 0; j < factors_.components; ++j) {
         const std::vector<Eigen::half>& volume =
             volumes_[static_cast<std::size_t>(j / kScalarsPerVolume)];
@@ -217,61 +174,36 @@ Eigen::Vector2d PackedLpca::evaluate(int texel,
 }
 
 ModelTexture PackedLpca::pack_texels(std::span<const Eigen::half> colours) const {
-  const int words = words_for(layout_);
-  ModelTexture texture{.sampler = "PackedTexels",
-                       .kind = TextureKind::k2D,
-                       .format = TexelFormat::kRgba32ui,
-                       .width = frame_.width * words,
-                       .height = frame_.height};
-  std::vector<std::uint16_t> lanes(static_cast<std::size_t>(texture.width) *
-                                   static_cast<std::size_t>(texture.height) * kLanesPerWord);
-  const int per_texel = words * kLanesPerWord;
-  const int first_colour = volume_count() * kScalarsPerVolume;
+  const auto count = static_cast<std::size_t>(3 * layout_.colours);
+  const int cluster_lane = cluster_lane_of(layout_);
   const auto bits = [](Eigen::half h) { return Eigen::numext::bit_cast<std::uint16_t>(h); };
-  for (int texel = 0; texel < frame_.texel_count(); ++texel) {
-    const auto out = std::span(lanes).subspan(
-        static_cast<std::size_t>(texel) * static_cast<std::size_t>(per_texel),
-        static_cast<std::size_t>(per_texel));
-    std::ranges::transform(factors_.weights_of(texel), out.begin(), bits);
-    const auto count = static_cast<std::size_t>(3 * layout_.colours);
+  return texels_of(layout_).texture(frame_, [&](int texel, std::span<std::uint16_t> lanes) {
+    const auto lane = static_cast<std::size_t>(cluster_lane);
+    std::ranges::transform(factors_.weights_of(texel), lanes.begin(), bits);
     std::ranges::transform(colours.subspan(static_cast<std::size_t>(texel) * count, count),
-                           out.begin() + first_colour,
+                           lanes.subspan(lane - count).begin(),
                            bits);
-    out[static_cast<std::size_t>(first_colour) + count] =
-        factors_.cluster[static_cast<std::size_t>(texel)];
-  }
-  texture.data = texture_data(lanes);
-  return texture;
+    lanes[lane] = factors_.cluster[static_cast<std::size_t>(texel)];
+  });
 }
 
 ModelShader PackedLpca::shader(std::span<const Eigen::half> colours) const {
   const int first_colour = volume_count() * kScalarsPerVolume;
   const int cluster_lane = cluster_lane_of(layout_);
-  const int words = words_for(layout_);
-  const int a = views_.nodes();
-  const int b = lights_.nodes();
+  const PackedTexels texels = texels_of(layout_);
+  const auto lane = [](int index) { return PackedTexels::half_lane(index); };
 
   std::string source = fmt::format(
-      "const ivec2 kTexels = ivec2({}, {});\n"
-      "const vec2 kVolumeSize = vec2({}, {});\n"
-      "const float kViewNodes = {}.0;\n"
-      "const float kLightNodes = {}.0;\n"
-      "const uint kClusterMask = {}u;\n"
-      "const int kClusterShift = {};\n"
+      "const ivec2 kTexels = ivec2({}, {});\n{}"
       "uniform usampler2D PackedTexels;\n",
       frame_.width,
       frame_.height,
-      width_,
-      height_,
-      a,
-      b,
-      (1 << cluster_shift_) - 1,
-      cluster_shift_);
+      place_.constants());
   for (int v = 0; v < volume_count(); ++v)
     source += fmt::format("uniform sampler3D Volume{};\n", v);
   source += kElevatedConcentricGlsl;
   source += kTexelAtGlsl;
-  source += kPackedLpcaGlsl;
+  source += kClusterVolumeGlsl;
 
   // What a texel makes of the scalars, wherever these come from.
   std::string mix;
@@ -290,26 +222,19 @@ ModelShader PackedLpca::shader(std::span<const Eigen::half> colours) const {
                        lane(first_colour + 3 * c),
                        lane(first_colour + 3 * c + 1),
                        lane(first_colour + 3 * c + 2));
-  std::string fetch = "  ivec2 texel = texel_at(uv);\n";
-  for (int w = 0; w < words; ++w)
-    fetch += fmt::format(
-        "  uvec4 word{0} = texelFetch(PackedTexels, ivec2(texel.x * {1} + {0}, texel.y), 0);\n",
-        w,
-        words);
-  fetch += fmt::format("  uint cluster = (word{}.{} >> {}) & 0xffffu;\n",
-                       cluster_lane / kLanesPerWord,
-                       "xyzw"[cluster_lane % kLanesPerWord / 2],
-                       cluster_lane % 2 * 16);
+  std::string fetch = fmt::format("  ivec2 texel = texel_at(uv);\n{}  uint cluster = {};\n",
+                                  texels.fetch(),
+                                  PackedTexels::uint_lane(cluster_lane));
   fetch += fmt::format("  scalars = vec2(0.0);\n  vec4 eigen[{}];\n", volume_count());
   std::string volumes;
   for (int v = 0; v < volume_count(); ++v)
-    volumes += fmt::format("  eigen[{0}] = packed_fetch(Volume{0}, place);\n", v);
+    volumes += fmt::format("  eigen[{0}] = volume_fetch(Volume{0}, place, 0.0);\n", v);
 
   const std::string results =
       fmt::format("out vec2 scalars, out vec3 colours[{}]", layout_.colours);
   source += fmt::format(
       "void packed_evaluate(vec2 uv, vec3 view, vec3 light, {}) {{\n{}"
-      "  PackedPlace place = packed_place(cluster, view, light);\n{}{}}}\n",
+      "  VolumePlace place = volume_place(cluster, view, light);\n{}{}}}\n",
       results,
       fetch,
       volumes,
@@ -319,7 +244,7 @@ ModelShader PackedLpca::shader(std::span<const Eigen::half> colours) const {
       "struct EigenPlace {{ vec3 view; vec3 light; }};\n"
       "EigenPlace eigen_place(vec3 view, vec3 light) {{ return EigenPlace(view, light); }}\n"
       "void eigen_values(EigenPlace at, int cluster, out vec4 eigen[{0}]) {{\n"
-      "  PackedPlace place = packed_place(uint(cluster), at.view, at.light);\n{1}"
+      "  VolumePlace place = volume_place(uint(cluster), at.view, at.light);\n{1}"
       "  for (int v = 0; v < {0}; ++v) eigen[v] *= at.light.z > 0.0 ? 1.0 : 0.0;\n}}\n#endif\n",
       volume_count(),
       volumes);
@@ -339,16 +264,16 @@ ModelShader PackedLpca::shader(std::span<const Eigen::half> colours) const {
     ModelTexture volume{.sampler = fmt::format("Volume{}", v),
                         .kind = TextureKind::k3D,
                         .format = TexelFormat::kRgba16f,
-                        .width = width_,
-                        .height = height_,
-                        .depth = b * b,
+                        .width = place_.width(),
+                        .height = place_.height(),
+                        .depth = place_.depth(),
                         .linear = true};
     volume.data = texture_data(volumes_[static_cast<std::size_t>(v)]);
     shader.textures.push_back(std::move(volume));
   }
-  shader.fetches = words + 2 * volume_count();
-  shader.cache =
-      EigenCache{.clusters = factors_.clusters, .layers = volume_count(), .texel_fetches = words};
+  shader.fetches = texels.words() + 2 * volume_count();
+  shader.cache = EigenCache{
+      .clusters = factors_.clusters, .layers = volume_count(), .texel_fetches = texels.words()};
   return shader;
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "btf/models/angular_grid.h"
+#include "btf/models/cluster_volume.h"
 #include "btf/models/lpca_factors.h"
 
 namespace veneer::btf {
@@ -31,8 +32,8 @@ class PackedLpca {
     int colours = 1;  ///< of a texel, 1 or 2
   };
 
-  /// Refuses, with `code`, volumes over kMostVolumeBytes and textures larger than GPUs take. fit()
-  /// and load() ask it too; models that look at all samples first ask it before.
+  /// Refuses, with `code`, volumes and textures larger than GPUs take. fit() and load() ask it too;
+  /// models that look at all samples first ask it before.
   [[nodiscard]] static Status check(const MaterialFrame& frame,
                                     const Layout& layout,
                                     int clusters,
@@ -71,8 +72,6 @@ class PackedLpca {
   /// colours)` (EigenCache).
   [[nodiscard]] ModelShader shader(std::span<const Eigen::half> colours) const;
 
-  static constexpr std::size_t kMostVolumeBytes = std::size_t{2} << 30U;
-
  private:
   PackedLpca(MaterialFrame frame, Layout layout, LpcaFactors factors);
   [[nodiscard]] int volume_count() const;
@@ -84,11 +83,8 @@ class PackedLpca {
   LpcaFactors factors_;
   AngularGrid views_;
   AngularGrid lights_;
-  // Clusters stand side by side in a volume, 2^cluster_shift_ in x, the others below in y.
-  int cluster_shift_ = 0;
-  int width_ = 0;                                  // of a volume, texels
-  int height_ = 0;                                 // of a volume, texels
-  std::vector<std::vector<Eigen::half>> volumes_;  // [volume][z][y][x][4]
+  ClusterVolume place_;
+  std::vector<std::vector<Eigen::half>> volumes_;  // [volume][texel][4]
 };
 
 }  // namespace veneer::btf
