@@ -7,6 +7,7 @@
 
 #include "btf/models/components.h"
 #include "btf/models/dichromatic_lpca/dichromatic_lpca.h"
+#include "btf/models/eigen_texture/eigen_texture.h"
 #include "btf/models/lafortune/lafortune.h"
 #include "btf/models/lpca/lpca.h"
 #include "btf/models/revised_lpca/revised_lpca.h"
@@ -27,6 +28,12 @@ constexpr std::array kModels{
           &fit_dichromatic_lpca,
           &load_dichromatic_lpca,
           true},
+    Model{"eigen-texture",
+          "pictures of every view, mixed by directions alone (Sattler et al. 2003)",
+          1,
+          false,
+          &fit_eigen_texture,
+          &load_eigen_texture},
     Model{"lafortune",
           "Lafortune lobes under one specular colour (McAllister et al. 2002)",
           0,

@@ -16,6 +16,7 @@ enum class TexelFormat {
   kR16ui,
   kRgba16ui,
   kRgba32ui,
+  kRgba8,
   kRgba8Snorm,
   kR16f,
   kRg16f,

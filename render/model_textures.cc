@@ -27,6 +27,8 @@ GlFormat gl_format(TexelFormat format) {
       return {GL_RGBA16UI, GL_RGBA_INTEGER, GL_UNSIGNED_SHORT, true};
     case TexelFormat::kRgba32ui:
       return {GL_RGBA32UI, GL_RGBA_INTEGER, GL_UNSIGNED_INT, true};
+    case TexelFormat::kRgba8:
+      return {GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, false};
     case TexelFormat::kRgba8Snorm:
       return {GL_RGBA8_SNORM, GL_RGBA, GL_BYTE, false};
     case TexelFormat::kR16f:

@@ -10,6 +10,8 @@ set(VENEER_MODEL_SRCS
   models/concentric_square.cc
   models/dichromatic_lpca/dichromatic_lpca.cc
   models/direction_lookup.cc
+  models/eigen_texture/eigen_images.cc
+  models/eigen_texture/eigen_texture.cc
   models/lafortune/lafortune.cc
   models/lobes/lafortune_lobes.cc
   models/lobes/lobe_fit.cc
@@ -29,6 +31,7 @@ set(VENEER_MODEL_TESTS
   models/angular_grid_test.cc
   models/cluster_volume_test.cc
   models/direction_lookup_test.cc
+  models/eigen_texture/eigen_texture_test.cc
   models/local_pca_test.cc
   models/models_test.cc
   models/real_material_test.cc
@@ -37,6 +40,7 @@ set(VENEER_MODEL_SHADERS
   models/cluster_volume.glsl
   models/dichromatic_lpca/dichromatic_lpca.glsl
   models/direction_lookup.glsl
+  models/eigen_texture/eigen_texture.glsl
   models/elevated_concentric.glsl
   models/lafortune/lafortune.glsl
   models/lobes/lafortune_lobes.glsl

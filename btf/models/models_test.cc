@@ -525,6 +525,8 @@ TEST(LoadMaterial, RefusesDamagedFilesWithAMessage) {
       });
       expect_refused("another shape of " + spec.name,
                      [i](auto& c) { c.tensors[i].spec.shape.back() *= 2; });
+      // Any byte is a value of an image.
+      if (spec.name == "eigen_textures" && spec.dtype == DType::kU8) continue;
       // All bits set: NaN, or a cluster that is not there.
       const std::vector<std::byte> bad(good.tensors[i].bytes.size(), std::byte{0xFF});
       expect_refused("bad values in " + spec.name, [&, i](auto& c) { c.tensors[i].bytes = bad; });
