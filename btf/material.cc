@@ -10,7 +10,10 @@
 #include "btf/models/eigen_texture/eigen_texture.h"
 #include "btf/models/lafortune/lafortune.h"
 #include "btf/models/lpca/lpca.h"
+#include "btf/models/phong/phong.h"
+#include "btf/models/reflectance_field/reflectance_field.h"
 #include "btf/models/revised_lpca/revised_lpca.h"
+#include "btf/models/scaled_lafortune/scaled_lafortune.h"
 #include "btf/models/texel_colours/texel_colours.h"
 
 namespace veneer::btf {
@@ -47,6 +50,18 @@ constexpr std::array kModels{
           &fit_lpca,
           &load_lpca,
           true},
+    Model{"phong",
+          "a diffuse colour and a white highlight about the mirror direction (Phong 1975)",
+          0,
+          false,
+          &fit_phong,
+          &load_phong},
+    Model{"reflectance-field",
+          "for each measured view lobes in the light direction (Meseth et al. 2003)",
+          0,
+          false,
+          &fit_reflectance_field,
+          &load_reflectance_field},
     Model{"revised-lpca",
           "RGB Eigen-BRDFs in a volume that the hardware interpolates (Schneider 2004)",
           1,
@@ -54,6 +69,12 @@ constexpr std::array kModels{
           &fit_revised_lpca,
           &load_revised_lpca,
           true},
+    Model{"scaled-lafortune",
+          "Lafortune lobes times a colour for each view (Daubert et al. 2001)",
+          0,
+          false,
+          &fit_scaled_lafortune,
+          &load_scaled_lafortune},
     Model{"texel-colours",
           "two learned colours a texel, scalar Eigen-BRDFs four to a volume (after Schneider 2004)",
           2,

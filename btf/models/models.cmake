@@ -23,6 +23,9 @@ set(VENEER_MODEL_SRCS
   models/material_tensors.cc
   models/matrix_product.cc
   models/packed_lpca.cc
+  models/phong/phong.cc
+  models/reflectance_field/reflectance_field.cc
+  models/scaled_lafortune/scaled_lafortune.cc
   models/packed_texels.cc
   models/revised_lpca/revised_lpca.cc
   models/row_clusters.cc
@@ -32,6 +35,9 @@ set(VENEER_MODEL_TESTS
   models/cluster_volume_test.cc
   models/direction_lookup_test.cc
   models/eigen_texture/eigen_texture_test.cc
+  models/lafortune/lafortune_test.cc
+  models/lobes/lobe_fit_test.cc
+  models/lobes/lobe_models_test.cc
   models/local_pca_test.cc
   models/models_test.cc
   models/real_material_test.cc
@@ -46,5 +52,8 @@ set(VENEER_MODEL_SHADERS
   models/lobes/lafortune_lobes.glsl
   models/lobes/lobes.glsl
   models/lpca/lpca.glsl
+  models/phong/phong.glsl
+  models/reflectance_field/reflectance_field.glsl
+  models/scaled_lafortune/scaled_lafortune.glsl
   models/texel_at.glsl
   models/texel_colours/texel_colours.glsl)

@@ -135,34 +135,40 @@ std::string fallback_remark(int texels) {
   return texels == 0 ? "" : fmt::format("{} texels stay diffuse", texels);
 }
 
+TexelFit fit_texel(const LobeFitter& fitter, const LobeTargets& targets) {
+  const StoredLobes diffuse = fitter.store(targets, Diffuse::kFree, {});
+  StoredLobes fitted = fitter.store(targets, Diffuse::kFree, fitter.fit(targets, kStarts));
+  const bool better = fitted.squared_error < diffuse.squared_error;
+  return {better ? std::move(fitted) : diffuse, !better};
+}
+
+LafortuneLobes::LafortuneLobes(int texels, int lobe_count)
+    : lobes(lobe_count),
+      diffuse(kChannels * static_cast<std::size_t>(texels)),
+      specular(diffuse.size()),
+      shapes(static_cast<std::size_t>(kLobeValues * lobe_count) *
+             static_cast<std::size_t>(texels)) {}
+
+void LafortuneLobes::set_texel(int texel, const StoredLobes& stored) {
+  const auto at = static_cast<std::ptrdiff_t>(texel);
+  std::ranges::copy(stored.diffuse, diffuse.begin() + 3 * at);
+  std::ranges::copy(stored.specular, specular.begin() + 3 * at);
+  std::ranges::copy(stored.lobes, shapes.begin() + kLobeValues * lobes * at);
+}
+
 LafortuneLobes LafortuneLobes::fit(const SampleSet& set, int lobes, Progress& progress) {
   const MaterialFrame frame = frame_of(set.info());
-  const auto texels = static_cast<std::size_t>(frame.texel_count());
   const LobeFitter fitter(pair_samples(frame), lobes);
-  LafortuneLobes result{.lobes = lobes,
-                        .fallback_texels = 0,
-                        .diffuse = std::vector<Eigen::half>(kChannels * texels),
-                        .specular = std::vector<Eigen::half>(kChannels * texels),
-                        .shapes = {}};
-  const auto values = static_cast<std::size_t>(kLobeValues * lobes);
-  result.shapes.resize(values * texels);
+  LafortuneLobes result(frame.texel_count(), lobes);
   std::atomic<int> fallbacks = 0;
   progress.start("lobes", frame.texel_count());
   parallel_for(frame.texel_count(), kGrain, [&](std::int64_t begin, std::int64_t end) {
     std::vector<float> rgb(kChannels * static_cast<std::size_t>(frame.pair_count()));
-    for (auto texel = static_cast<std::size_t>(begin); texel < static_cast<std::size_t>(end);
-         ++texel) {
-      set.rgb(static_cast<int>(texel), Part::kTotal, rgb);
-      const LobeTargets targets = weighted_targets(rgb);
-      const StoredLobes diffuse = fitter.store(targets, Diffuse::kFree, {});
-      StoredLobes best = fitter.store(targets, Diffuse::kFree, fitter.fit(targets, kStarts));
-      if (!(best.squared_error < diffuse.squared_error)) {
-        best = diffuse;
-        ++fallbacks;
-      }
-      std::ranges::copy(best.diffuse, &result.diffuse[kChannels * texel]);
-      std::ranges::copy(best.specular, &result.specular[kChannels * texel]);
-      std::ranges::copy(best.lobes, &result.shapes[values * texel]);
+    for (auto texel = static_cast<int>(begin); texel < end; ++texel) {
+      set.rgb(texel, Part::kTotal, rgb);
+      const TexelFit fit = fit_texel(fitter, weighted_targets(rgb));
+      result.set_texel(texel, fit.stored);
+      fallbacks += fit.fell_back ? 1 : 0;
     }
     progress.advance(end - begin);
   });
@@ -173,9 +179,9 @@ LafortuneLobes LafortuneLobes::fit(const SampleSet& set, int lobes, Progress& pr
 
 Result<LafortuneLobes> LafortuneLobes::read(const SafetensorsFile& file,
                                             const MaterialFrame& frame) {
-  LafortuneLobes result;
   const std::int64_t texels = frame.texel_count();
-  VENEER_ASSIGN(result.lobes, read_integer(file, "lobes", 1, FitOptions::kMostLobes));
+  VENEER_ASSIGN(const int lobes, read_integer(file, "lobes", 1, FitOptions::kMostLobes));
+  LafortuneLobes result(0, lobes);
   VENEER_ASSIGN(result.fallback_texels,
                 read_integer(file, "fallback_texels", 0, frame.texel_count()));
   VENEER_ASSIGN(result.diffuse, read_colours(file, "diffuse", {texels, 3}));

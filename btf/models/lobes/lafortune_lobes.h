@@ -61,16 +61,26 @@ class LayerWriter {
 /// What a fit says at its end where texels fell back.
 [[nodiscard]] std::string fallback_remark(int texels);
 
+/// A texel's lobes of LobeSpace::kPair.
+struct TexelFit {
+  StoredLobes stored;
+  bool fell_back;  ///< the lobes gained nothing over the diffuse colour, which stays alone
+};
+[[nodiscard]] TexelFit fit_texel(const LobeFitter& fitter, const LobeTargets& targets);
+
 /// Spatially varying Lafortune lobes: the diffuse and the specular colour of each texel and its k
 /// lobes with diagonal matrices.
 struct LafortuneLobes {
-  int lobes = 0;
+  int lobes;
   int fallback_texels = 0;            ///< whose lobes gained nothing over their diffuse colour
   std::vector<Eigen::half> diffuse;   ///< [texel][3]
   std::vector<Eigen::half> specular;  ///< [texel][3]
   std::vector<Eigen::half> shapes;    ///< [texel][lobe][kLobeValues]
 
+  /// All black.
+  LafortuneLobes(int texels, int lobes);
   [[nodiscard]] static LafortuneLobes fit(const SampleSet& set, int lobes, Progress& progress);
+  void set_texel(int texel, const StoredLobes& stored);
   /// Errors: kBadFormat.
   [[nodiscard]] static Result<LafortuneLobes> read(const SafetensorsFile& file,
                                                    const MaterialFrame& frame);

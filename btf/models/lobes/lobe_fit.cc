@@ -36,16 +36,20 @@ constexpr double kParallel = 1e-7;
 constexpr double kLeastDamping = 1e-7;
 constexpr double kMostDamping = 1e7;
 constexpr int kColumns = 2;  // the diffuse column and that of all lobes
+constexpr int kMostUnknowns = kLobeValues * FitOptions::kMostLobes;
+constexpr int kMostColumns = kColumns + kMostUnknowns;
 
 using Block = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic>;
 
 // Products of the columns (diffuse, lobes, derivatives by each lobe's c and log n), with each other
 // and with the targets.
 struct Products {
-  Eigen::MatrixXd gram;
-  Eigen::MatrixX3d by_target;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostColumns, kMostColumns> gram;
+  Eigen::Matrix<double, Eigen::Dynamic, 3, 0, kMostColumns, 3> by_target;
   double target = 0.0;  // squared
 };
+
+using Unknowns = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostUnknowns, 1>;
 
 // The colours that fit best, and what is left.
 struct Colours {
@@ -60,14 +64,15 @@ float reach(LobeSpace space, const Eigen::Vector3f& c) {
   return std::hypot(c.head<2>().norm(), up);
 }
 
-// Bounded exponents, largest base and largest amplitude 1. False where a lobe reaches no sample.
+// Bounded exponents, largest base and largest amplitude 1. False where a lobe hardly reaches any
+// sample, so that what it is elsewhere would be made up.
 bool normalise(const LobeSamples& samples, std::span<LobeShape> shapes) {
   float largest = 0.0F;
   for (LobeShape& shape : shapes) {
     const float r = reach(samples.space, shape.c);
     if (!(r > 0.0F) || !shape.c.allFinite() || !std::isfinite(shape.exponent)) return false;
     const float peak = (samples.u.matrix() * (shape.c / r)).maxCoeff();
-    if (!(peak > 0.0F)) return false;
+    if (!(peak * kMostRise >= 1.0F)) return false;
     const float bound = peak < 1.0F ? std::log(kMostRise) / -std::log(peak) : kMostExponent;
     shape.exponent = std::clamp(
         shape.exponent, kLeastExponent, std::clamp(bound, kLeastExponent, kMostExponent));
@@ -88,7 +93,9 @@ Products products_of(const LobeSamples& samples,
                      bool slopes) {
   const auto columns =
       kColumns + (slopes ? kLobeValues * static_cast<Eigen::Index>(shapes.size()) : 0);
-  Products sums{Eigen::MatrixXd::Zero(columns, columns), Eigen::MatrixX3d::Zero(columns, 3), 0.0};
+  Products sums;
+  sums.gram.setZero(columns, columns);
+  sums.by_target.setZero(columns, 3);
   Block block(std::min(kBlock, samples.u.rows()), columns);
   Eigen::ArrayXf base;
   Eigen::ArrayXf logarithm;
@@ -154,15 +161,17 @@ Colours solve(const Products& products, Diffuse diffuse) {
 // Normal equations of the lobes' parameters, the colours projected out. A colour at its bound is no
 // unknown there.
 struct Step {
-  Eigen::MatrixXd matrix;
-  Eigen::VectorXd gradient;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostUnknowns, kMostUnknowns> matrix;
+  Unknowns gradient;
 };
 Step step_of(const Products& products, const Colours& colours) {
   const Eigen::Index unknowns = products.gram.rows() - kColumns;
   const Eigen::Matrix2d gram = products.gram.topLeftCorner<kColumns, kColumns>();
   const auto cross = products.gram.bottomLeftCorner(unknowns, kColumns);
   const auto slopes = products.gram.bottomRightCorner(unknowns, unknowns);
-  Step step{Eigen::MatrixXd::Zero(unknowns, unknowns), Eigen::VectorXd::Zero(unknowns)};
+  Step step;
+  step.matrix.setZero(unknowns, unknowns);
+  step.gradient.setZero(unknowns);
   for (int channel = 0; channel < 3; ++channel) {
     const Eigen::Vector2d x = colours.value.col(channel);
     if (!(x[1] > 0.0)) continue;
@@ -177,7 +186,7 @@ Step step_of(const Products& products, const Colours& colours) {
   return step;
 }
 
-std::vector<LobeShape> moved(std::span<const LobeShape> shapes, const Eigen::VectorXd& by) {
+std::vector<LobeShape> moved(std::span<const LobeShape> shapes, const Unknowns& by) {
   std::vector<LobeShape> result(shapes.begin(), shapes.end());
   for (std::size_t i = 0; i < result.size(); ++i) {
     const Eigen::Vector4d d = by.segment<kLobeValues>(kLobeValues * static_cast<Eigen::Index>(i));
@@ -245,7 +254,8 @@ double lobe_value(std::span<const Eigen::half> stored, const Eigen::Vector3d& u)
 }
 
 LobeFitter::LobeFitter(LobeSamples samples, int lobes) : all_(std::move(samples)), lobes_(lobes) {
-  VENEER_CHECK(all_.u.rows() > 0 && all_.u.rows() == all_.cosine.size() && lobes > 0);
+  VENEER_CHECK(all_.u.rows() > 0 && all_.u.rows() == all_.cosine.size() && lobes > 0 &&
+               lobes <= FitOptions::kMostLobes);
   // An irrational stride, so that views and lights are taken evenly whatever their numbers.
   const Eigen::Index rows = all_.u.rows();
   const double golden = (std::sqrt(5.0) - 1.0) / 2.0;
@@ -272,8 +282,7 @@ std::vector<LobeShape> LobeFitter::fit(const LobeTargets& targets,
   std::vector<LobeShape> shapes;
   for (int lobe = 0; lobe < lobes_; ++lobe) {
     double least = std::numeric_limits<double>::infinity();
-    std::vector<LobeShape> best = shapes;
-    best.push_back(starts.front());
+    std::vector<LobeShape> best;
     for (const LobeShape& start : starts) {
       std::vector<LobeShape> tried = shapes;
       tried.push_back(start);
@@ -283,6 +292,7 @@ std::vector<LobeShape> LobeFitter::fit(const LobeTargets& targets,
       least = error;
       best = std::move(tried);
     }
+    if (best.empty()) break;  // no start reaches the samples
     shapes = std::move(best);
   }
   refine(targets, Diffuse::kFree, shapes);
@@ -293,6 +303,23 @@ void LobeFitter::refine(const LobeTargets& targets,
                         Diffuse diffuse,
                         std::vector<LobeShape>& shapes) const {
   descend(all_, targets, diffuse, kIterations, shapes);
+}
+
+std::vector<LobeShape> LobeFitter::shapes_of(const StoredLobes& stored) {
+  std::vector<LobeShape> shapes;
+  for (std::size_t i = 0; i + kLobeValues <= stored.lobes.size(); i += kLobeValues)
+    shapes.push_back({{static_cast<float>(stored.lobes[i]),
+                       static_cast<float>(stored.lobes[i + 1]),
+                       static_cast<float>(stored.lobes[i + 2])},
+                      static_cast<float>(stored.lobes[i + 3])});
+  return shapes;
+}
+
+Eigen::ArrayXf LobeFitter::lobes_at_samples(const StoredLobes& stored) const {
+  Eigen::ArrayXf sum = Eigen::ArrayXf::Zero(all_.u.rows());
+  for (const LobeShape& shape : shapes_of(stored))
+    sum += (shape.exponent * (all_.u.matrix() * shape.c).array().max(kTinyBase).log()).exp();
+  return all_.cosine * sum;
 }
 
 StoredLobes LobeFitter::store(const LobeTargets& targets,

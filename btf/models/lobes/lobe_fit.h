@@ -82,6 +82,10 @@ class LobeFitter {
   [[nodiscard]] StoredLobes store(const LobeTargets& targets,
                                   Diffuse diffuse,
                                   std::span<const LobeShape> shapes) const;
+  /// Stored lobes as a start for another refinement.
+  [[nodiscard]] static std::vector<LobeShape> shapes_of(const StoredLobes& stored);
+  /// cosine times the sum of stored lobes, for each sample.
+  [[nodiscard]] Eigen::ArrayXf lobes_at_samples(const StoredLobes& stored) const;
 
  private:
   LobeSamples all_;
