@@ -2,7 +2,6 @@
 #include "btf/communicator.h"
 
 #include <algorithm>
-#include <bit>
 #include <cstdint>
 #include <string>
 
@@ -37,15 +36,14 @@ Status agree(Communicator& ranks, const Status& own) {
 }
 
 RowRange rows_of_rank(int rows, const Communicator& ranks) {
-  constexpr std::int64_t kMostAligned = 4096;
-  const std::int64_t share = rows / (std::int64_t{4} * ranks.size());
-  const std::int64_t unit =
-      ranks.size() == 1
-          ? rows
-          : std::min(kMostAligned,
-                     static_cast<std::int64_t>(std::bit_floor(
-                         static_cast<std::uint64_t>(std::max<std::int64_t>(share, 1)))));
-  if (rows == 0) return {};
+  constexpr int kMostAligned = 4096;
+  // Rows of the rank that has most of them, when ranks begin at multiples of `unit`.
+  const auto most = [&](std::int64_t unit) {
+    const std::int64_t units = (rows + unit - 1) / unit;
+    return (units + ranks.size() - 1) / ranks.size() * unit;
+  };
+  std::int64_t unit = kMostAligned;
+  while (unit > 1 && 4 * ranks.size() * most(unit) > std::int64_t{5} * rows) unit /= 2;
   const std::int64_t units = (rows + unit - 1) / unit;
   const auto start = [&](std::int64_t rank) {
     return static_cast<int>(std::min<std::int64_t>(rows, units * rank / ranks.size() * unit));

@@ -20,7 +20,7 @@ struct Command {
 };
 
 constexpr std::array kCommands{
-    Command{"bench", "Time what this machine does: bench render", &cli::run_bench},
+    Command{"bench", "Time what this machine does: bench render, bench fit", &cli::run_bench},
     Command{"calibrate", "Measure a projector and write its profile", &cli::run_calibrate},
     Command{"demo",
             "Run the main job without hardware and report what the eye receives",

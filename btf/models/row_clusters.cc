@@ -22,7 +22,7 @@ static_assert(kChunkRows % kPieceRows == 0);
 constexpr double kLeastGain = 1e-4;
 constexpr double kFloatResolution = 1e-7;
 constexpr int kStarts = 4;
-constexpr int kSwaps = 48;
+constexpr int kSwaps = 96;
 constexpr double kLeastKMeansGain = 1e-3;
 constexpr int kMostKMeansIterations = 25;
 // Steps of subspace iteration from random directions, and from those of nearly the same rows.
@@ -288,7 +288,11 @@ class Lloyd {
     double place = random.uniform() * state.error;
     const auto worst = static_cast<int>(
         interval_at([&](std::size_t k) { return state.errors[k]; }, state.errors.size(), place));
-    const auto removed = static_cast<int>(random.uniform() * clusters_);
+    // The smaller of two: of the little that is lost with it, more can be gained.
+    const auto any = [&] { return static_cast<std::size_t>(random.uniform() * clusters_); };
+    const std::size_t one = any();
+    const std::size_t other = any();
+    const auto removed = static_cast<int>(state.sizes[other] < state.sizes[one] ? other : one);
     const double mean = state.errors[static_cast<std::size_t>(worst)] /
                         std::max(state.sizes[static_cast<std::size_t>(worst)], 1.0);
     for (std::size_t row = 0; row < state.cluster.size(); ++row) {

@@ -9,6 +9,7 @@
 #include "base/exit_code.h"
 #include "btf/material.h"
 #include "btf/sample_set.h"
+#include "cli/commands/bench_fit.h"
 #include "cli/commands/commands.h"
 #include "render/benchmark.h"
 #include "simulation/materials/synthesize.h"
@@ -98,9 +99,22 @@ Result<int> run_bench(CommandLine& line) {
   render::RenderBenchOptions options;
   render::AngularCacheOptions cache;
   CLI::App& app = line.app();
-  app.add_option("what", what, "render: what drawing a frame costs with each model")
+  app.add_option(
+         "what",
+         what,
+         "render: what drawing a frame costs with each model; fit: what finding clusters in "
+         "a basis gains")
       ->required()
-      ->check(CLI::IsMember({"render"}));
+      ->check(CLI::IsMember({"fit", "render"}));
+  fs::path fitted_set;
+  std::string model_name = "lpca";
+  btf::FitOptions fit;
+  app.add_option("samples", fitted_set, "fit: the sample set, NAME.btfset");
+  app.add_option("--model", model_name, "fit: a clustered model")->capture_default_str();
+  app.add_option("--clusters", fit.clusters, "fit: clusters of texels")->capture_default_str();
+  app.add_option("--components", fit.components, "fit: Eigen-BRDFs per texel")
+      ->capture_default_str();
+  app.add_option("--seed", fit.seed, "fit: seed of everything random")->capture_default_str();
   app.add_option("--size", size, "Pixels, WIDTHxHEIGHT")->capture_default_str();
   app.add_option("--frames", options.frames, "Draws of each")->capture_default_str();
   app.add_option(
@@ -114,6 +128,14 @@ Result<int> run_bench(CommandLine& line) {
   app.add_option("--cache-turn", cache.most_turn, "The most that directions may turn between nodes")
       ->capture_default_str();
   line.parse();
+  if (what == "fit") {
+    if (fitted_set.empty())
+      return fail(Errc::kInvalidOption, "bench fit: name a sample set, NAME.btfset");
+    VENEER_ASSIGN(const btf::Model* model, btf::find_model(model_name));
+    return bench_fit(fitted_set, *model, fit, line);
+  }
+  if (!fitted_set.empty())
+    return fail(Errc::kInvalidOption, "bench {}: it takes no sample set", what);
   if (char rest = 0;
       std::sscanf(size.c_str(), "%dx%d%c", &options.width, &options.height, &rest) != 2) {
     return fail(Errc::kInvalidOption, "--size {}: expected WIDTHxHEIGHT, such as 1024x768", size);
