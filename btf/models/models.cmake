@@ -10,6 +10,7 @@ set(VENEER_MODEL_SRCS
   models/concentric_square.cc
   models/dichromatic_lpca/dichromatic_lpca.cc
   models/direction_lookup.cc
+  models/eigen_rgb.cc
   models/eigen_texture/eigen_images.cc
   models/eigen_texture/eigen_texture.cc
   models/lafortune/lafortune.cc

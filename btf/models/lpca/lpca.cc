@@ -5,6 +5,7 @@
 
 #include "btf/models/components.h"
 #include "btf/models/direction_lookup.h"
+#include "btf/models/eigen_rgb.h"
 #include "btf/models/lpca_factors.h"
 
 namespace veneer::btf {
@@ -100,6 +101,34 @@ class Lpca final : public Material {
   DirectionLookup lights_;
 };
 
+// The functions of EigenCache.
+std::string cached_source(int components) {
+  std::string nodes;
+  std::string pixels;
+  for (int c = 0; c < components; ++c) {
+    nodes += fmt::format("  vec3 brdf{0} = brdf_at(place, cluster, {0});\n", c);
+    if (c % kWeightsPerTexel == 0)
+      pixels += fmt::format("  vec4 weight{0} = texelFetch(Weights, ivec3(texel, {0}), 0);\n",
+                            c / kWeightsPerTexel);
+    pixels += fmt::format(
+        "  sum += weight{}[{}] * {};\n", c / kWeightsPerTexel, c % kWeightsPerTexel, eigen_rgb(c));
+  }
+  return fmt::format(
+      "#ifdef CACHE_NODES\n"
+      "void eigen_values(EigenPlace place, int cluster, out vec4 values[{}]) {{\n{}{}}}\n#endif\n"
+      "#ifdef CACHE_PIXELS\n"
+      "vec3 btf_radiance_cached(vec2 uv) {{\n"
+      "  ivec2 texel = texel_at(uv);\n"
+      "  int cluster = int(texelFetch(Clusters, texel, 0).r);\n{}"
+      "  vec3 sum = vec3(0.0);\n{}"
+      "  return max(sum, 0.0);\n}}\n#endif\n",
+      eigen_rgb_layers(components),
+      nodes,
+      fill_eigen_rgb(components),
+      fetch_eigen_rgb(components),
+      pixels);
+}
+
 ModelShader Lpca::shader() const {
   const int components = factors_.components;
   const int layers = (components + kWeightsPerTexel - 1) / kWeightsPerTexel;
@@ -114,6 +143,7 @@ ModelShader Lpca::shader() const {
   shader.source += kDirectionLookupGlsl;
   shader.source += kTexelAtGlsl;
   shader.source += kGlsl;
+  shader.source += cached_source(components);
 
   ModelTexture clusters{.sampler = "Clusters",
                         .format = TexelFormat::kR8ui,
@@ -164,7 +194,7 @@ ModelShader Lpca::shader() const {
   lights_.add_textures("Light", shader.textures);
   shader.fetches = 1 + layers + 2 * DirectionLookup::kFetches + 9 * components;
   shader.cache = EigenCache{.clusters = factors_.clusters,
-                            .layers = (3 * components + 3) / 4,
+                            .layers = eigen_rgb_layers(components),
                             .texel_fetches = 1 + layers};
   return shader;
 }

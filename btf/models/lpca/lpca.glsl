@@ -44,37 +44,14 @@ EigenPlace eigen_place(vec3 view, vec3 light) {
   return place;
 }
 
-// The components' colours one after the other.
-void eigen_values(EigenPlace place, int cluster, out vec4 values[kCacheLayers]) {
-  values[kCacheLayers - 1] = vec4(0.0);
-  for (int c = 0; c < kComponents; ++c) {
-    vec3 brdf = vec3(0.0);
-    for (int i = 0; i < 3; ++i) {
-      int row = c * kViews + place.view.index[i];
-      for (int j = 0; j < 3; ++j)
-        brdf += place.view.weight[i] * place.light.weight[j] *
-                texelFetch(EigenBrdfs, ivec3(place.light.index[j], row, cluster), 0).rgb;
-    }
-    for (int channel = 0; channel < 3; ++channel)
-      values[(3 * c + channel) / 4][(3 * c + channel) % 4] = brdf[channel];
+vec3 brdf_at(EigenPlace place, int cluster, int component) {
+  vec3 brdf = vec3(0.0);
+  for (int i = 0; i < 3; ++i) {
+    int row = component * kViews + place.view.index[i];
+    for (int j = 0; j < 3; ++j)
+      brdf += place.view.weight[i] * place.light.weight[j] *
+              texelFetch(EigenBrdfs, ivec3(place.light.index[j], row, cluster), 0).rgb;
   }
-}
-#endif
-
-#ifdef CACHE_PIXELS
-vec3 btf_radiance_cached(vec2 uv) {
-  ivec2 texel = texel_at(uv);
-  int cluster = int(texelFetch(Clusters, texel, 0).r);
-  vec4 eigen[kCacheLayers];
-  for (int layer = 0; layer < kCacheLayers; ++layer) eigen[layer] = cached_eigen(cluster, layer);
-  vec3 sum = vec3(0.0);
-  for (int layer = 0; 4 * layer < kComponents; ++layer) {
-    vec4 weight = texelFetch(Weights, ivec3(texel, layer), 0);
-    for (int c = 4 * layer; c < min(4 * layer + 4, kComponents); ++c)
-      for (int channel = 0; channel < 3; ++channel)
-        sum[channel] +=
-            weight[c - 4 * layer] * eigen[(3 * c + channel) / 4][(3 * c + channel) % 4];
-  }
-  return max(sum, 0.0);
+  return brdf;
 }
 #endif

@@ -9,6 +9,7 @@
 #include "btf/models/angular_grid.h"
 #include "btf/models/cluster_volume.h"
 #include "btf/models/components.h"
+#include "btf/models/eigen_rgb.h"
 #include "btf/models/lpca_factors.h"
 #include "btf/models/packed_texels.h"
 
@@ -140,6 +141,7 @@ class RevisedLpca final : public Material {
   // One Eigen-BRDF at the nodes: [light node][view node] for each channel.
   std::array<RowMatrix, 3> at_nodes(int cluster, int component) const;
   void fill_volume();
+  [[nodiscard]] std::string cached_source() const;  // the functions of EigenCache
 
   MaterialFrame frame_;
   Layout layout_;
@@ -214,6 +216,37 @@ void RevisedLpca::fill_volume() {
                          static_cast<float>(factors_.weights[weight_index(texel, j)]));
 }
 
+std::string RevisedLpca::cached_source() const {
+  const PackedTexels texels = layout_.texels();
+  const int components = layout_.components;
+  std::string nodes;
+  std::string pixels;
+  for (int j = 0; j < components; ++j) {
+    nodes += fmt::format("  vec3 brdf{0} = lit * volume_fetch(EigenBrdfs, place, {0}.0).rgb;\n", j);
+    pixels += fmt::format("  sum += {} * {};\n", PackedTexels::half_lane(j), eigen_rgb(j));
+  }
+  return fmt::format(
+      "#ifdef CACHE_NODES\n"
+      "struct EigenPlace {{ vec3 view; vec3 light; }};\n"
+      "EigenPlace eigen_place(vec3 view, vec3 light) {{ return EigenPlace(view, light); }}\n"
+      "void eigen_values(EigenPlace at, int cluster, out vec4 values[{}]) {{\n"
+      "  VolumePlace place = volume_place(uint(cluster), at.view, at.light);\n"
+      "  float lit = at.light.z > 0.0 ? 1.0 : 0.0;\n{}{}}}\n#endif\n"
+      "#ifdef CACHE_PIXELS\n"
+      "vec3 btf_radiance_cached(vec2 uv) {{\n"
+      "  ivec2 texel = texel_at(uv);\n{}"
+      "  int cluster = int({});\n{}"
+      "  vec3 sum = vec3(0.0);\n{}"
+      "  return max(sum, 0.0);\n}}\n#endif\n",
+      eigen_rgb_layers(components),
+      nodes,
+      fill_eigen_rgb(components),
+      texels.fetch(),
+      PackedTexels::uint_lane(components),
+      fetch_eigen_rgb(components),
+      pixels);
+}
+
 ModelShader RevisedLpca::shader() const {
   const PackedTexels texels = layout_.texels();
   const int components = layout_.components;
@@ -240,6 +273,7 @@ ModelShader RevisedLpca::shader() const {
                                  PackedTexels::half_lane(j),
                                  j);
   shader.source += "  return light.z > 0.0 ? max(sum, 0.0) : vec3(0.0);\n}\n";
+  shader.source += cached_source();
 
   shader.textures.push_back(
       texels.texture(frame_, [this](int texel, std::span<std::uint16_t> lanes) {
@@ -260,6 +294,9 @@ ModelShader RevisedLpca::shader() const {
       layout_.precision == Precision::k8Bit ? texture_data(bytes_) : texture_data(halves_);
   shader.textures.push_back(std::move(volume));
   shader.fetches = texels.words() + 2 * components;
+  shader.cache = EigenCache{.clusters = factors_.clusters,
+                            .layers = eigen_rgb_layers(components),
+                            .texel_fetches = texels.words()};
   return shader;
 }
 
