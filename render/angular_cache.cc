@@ -22,11 +22,8 @@ constexpr char kNodesFrag[] =
 constexpr char kCellsFrag[] =
 #include "render/shaders/cache_cells.frag.inc"
     ;
-constexpr char kEdgesVert[] =
-#include "render/shaders/cache_edges.vert.inc"
-    ;
-constexpr char kEdgesFrag[] =
-#include "render/shaders/cache_edges.frag.inc"
+constexpr char kSortComp[] =
+#include "render/shaders/cache_sort.comp.inc"
     ;
 constexpr char kValuesComp[] =
 #include "render/shaders/cache_values.comp.inc"
@@ -38,17 +35,14 @@ constexpr char kDrawCachedFrag[] =
 #include "render/shaders/draw_cached.frag.inc"
     ;
 
-int nodes_along(int pixels, int spacing) { return (pixels + spacing - 1) / spacing + 1; }
+// One more on each side than the raster needs, so that triangles over its edge can be served.
+int nodes_along(int pixels, int spacing) {
+  return (pixels + spacing - 1) / spacing + 1 + 2 * kCacheMargin;
+}
 
-std::string raster_constants(const CacheRaster& raster) {
+std::string place_constants(int spacing) {
   return fmt::format(
-      "const vec2 kPixels = vec2({}, {});\nconst float kSpacing = {}.0;\n"
-      "const vec2 kCells = vec2({}, {});\n",
-      raster.width,
-      raster.height,
-      raster.spacing,
-      nodes_along(raster.width, raster.spacing) - 1,
-      nodes_along(raster.height, raster.spacing) - 1);
+      "const float kSpacing = {}.0;\nconst float kMargin = {}.0;\n", spacing, kCacheMargin);
 }
 
 std::string cache_constants(const btf::EigenCache& cache) {
@@ -82,15 +76,16 @@ std::string cache_cells_fragment_source(int light_count, double most_turn) {
   return surface_header(light_count) + most_turn_constant(most_turn) + kCellsFrag;
 }
 
-std::string cache_edges_vertex_source(int light_count, const CacheRaster& raster) {
-  return surface_header(light_count) + raster_constants(raster) + kEdgesVert;
-}
-
-std::string cache_edges_fragment_source(int light_count,
-                                        const CacheRaster& raster,
-                                        double most_turn) {
-  return surface_header(light_count) + raster_constants(raster) + most_turn_constant(most_turn) +
-         kEdgesFrag;
+std::string cache_sort_compute_source(int light_count,
+                                      const CacheRaster& raster,
+                                      double most_turn) {
+  return surface_header(light_count) +
+         fmt::format("const vec2 kPixels = vec2({}, {});\nconst vec2 kCells = vec2({}, {});\n",
+                     raster.width,
+                     raster.height,
+                     nodes_along(raster.width, raster.spacing) - 1,
+                     nodes_along(raster.height, raster.spacing) - 1) +
+         place_constants(raster.spacing) + most_turn_constant(most_turn) + kSortComp;
 }
 
 std::string cache_values_compute_source(const btf::ModelShader& shader) {
@@ -102,10 +97,9 @@ std::string draw_cached_fragment_source(const btf::ModelShader& shader,
                                         int light_count,
                                         int spacing) {
   return surface_header(light_count) + "#define CACHE_PIXELS\n" + cache_constants(*shader.cache) +
-         fmt::format("const int kCacheLightLayers = {};\nconst float kSpacing = {}.0;\n",
-                     shader.cache->clusters * shader.cache->layers,
-                     spacing) +
-         kCachedEigenGlsl + shader.source + kDrawCachedFrag;
+         fmt::format("const int kCacheLightLayers = {};\n",
+                     shader.cache->clusters * shader.cache->layers) +
+         place_constants(spacing) + kCachedEigenGlsl + shader.source + kDrawCachedFrag;
 }
 
 Result<AngularCache> AngularCache::create(const btf::ModelShader& shader,
@@ -147,12 +141,10 @@ Result<AngularCache> AngularCache::create(const btf::ModelShader& shader,
                                "cache_cells.frag",
                                cache_cells_fragment_source(light_count, options.most_turn)}}));
   VENEER_ASSIGN(
-      cache.edges_program_,
-      link_program(
-          {{GL_VERTEX_SHADER, "cache_edges.vert", cache_edges_vertex_source(light_count, raster)},
-           {GL_FRAGMENT_SHADER,
-            "cache_edges.frag",
-            cache_edges_fragment_source(light_count, raster, options.most_turn)}}));
+      cache.sort_program_,
+      link_program({{GL_COMPUTE_SHADER,
+                     "cache_sort.comp",
+                     cache_sort_compute_source(light_count, raster, options.most_turn)}}));
   VENEER_ASSIGN(cache.values_program_,
                 link_program({{GL_COMPUTE_SHADER,
                                "the model in cache_values.comp",
@@ -195,12 +187,12 @@ Result<AngularCache> AngularCache::create(const btf::ModelShader& shader,
 }
 
 Eigen::Matrix4d AngularCache::nodes_from_clip() const {
-  // The raster's pixel X is node X / spacing, whose centre lies half a node further.
+  // The raster's pixel X is node X / spacing + margin, whose centre lies half a node further.
   Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
   m(0, 0) = scale_x_ / columns_;
-  m(0, 3) = (scale_x_ + 1.0) / columns_ - 1.0;
+  m(0, 3) = (scale_x_ + 2.0 * kCacheMargin + 1.0) / columns_ - 1.0;
   m(1, 1) = scale_y_ / rows_;
-  m(1, 3) = (scale_y_ + 1.0) / rows_ - 1.0;
+  m(1, 3) = (scale_y_ + 2.0 * kCacheMargin + 1.0) / rows_ - 1.0;
   return m;
 }
 
@@ -208,7 +200,6 @@ void AngularCache::fill(const MeshBuffers& mesh,
                         const ModelTextures& textures,
                         GLuint frame_block,
                         GLuint nodes_frame_block) const {
-  glDisable(GL_STENCIL_TEST);
   glDisable(GL_BLEND);
   glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
 
@@ -230,11 +221,10 @@ void AngularCache::fill(const MeshBuffers& mesh,
   glUseProgram(cells_program_.id());
   glBindVertexArray(no_vertices_.id());
   glDrawArrays(GL_TRIANGLES, 0, 3);
-  glUseProgram(edges_program_.id());
+  glUseProgram(sort_program_.id());
+  glBindTextureUnit(1, cells_.id());
   glBindBufferBase(GL_UNIFORM_BUFFER, 0, frame_block);
-  glPolygonMode(GL_FRONT_AND_BACK, GL_LINE);
-  mesh.draw();
-  glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+  mesh.sort();
 
   glUseProgram(values_program_.id());
   textures.bind();
@@ -248,35 +238,16 @@ void AngularCache::fill(const MeshBuffers& mesh,
   glEnable(GL_DEPTH_TEST);
 }
 
-void AngularCache::bind() const {
-  glBindTextureUnit(first_unit_, values_.id());
-  glBindTextureUnit(first_unit_ + 1, cells_.id());
-}
+void AngularCache::bind() const { glBindTextureUnit(first_unit_, values_.id()); }
 
 void AngularCache::assign(GLuint program) const {
   glProgramUniform1i(
       program, glGetUniformLocation(program, "CacheValues"), static_cast<GLint>(first_unit_));
-  glProgramUniform1i(
-      program, glGetUniformLocation(program, "CacheCells"), static_cast<GLint>(first_unit_ + 1));
 }
 
 std::size_t AngularCache::gpu_bytes() const {
   return static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_) *
          static_cast<std::size_t>(layers_) * kBytesPerValue;
-}
-
-double AngularCache::served() const {
-  std::vector<std::uint8_t> cells(static_cast<std::size_t>(columns_ - 1) *
-                                  static_cast<std::size_t>(rows_ - 1));
-  glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glPixelStorei(GL_PACK_ROW_LENGTH, 0);
-  glGetTextureImage(cells_.id(),
-                    0,
-                    GL_RED_INTEGER,
-                    GL_UNSIGNED_BYTE,
-                    static_cast<GLsizei>(cells.size()),
-                    cells.data());
-  return static_cast<double>(std::ranges::count(cells, 1)) / static_cast<double>(cells.size());
 }
 
 }  // namespace veneer::render

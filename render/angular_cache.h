@@ -16,6 +16,9 @@
 
 namespace veneer::render {
 
+/// Nodes beyond each edge of the raster.
+inline constexpr int kCacheMargin = 1;
+
 /// The projector's raster and the pixels between nodes.
 struct CacheRaster {
   int width;
@@ -26,10 +29,9 @@ struct CacheRaster {
 /// The sources of its programs, complete and compilable.
 [[nodiscard]] std::string cache_nodes_fragment_source(int light_count);
 [[nodiscard]] std::string cache_cells_fragment_source(int light_count, double most_turn);
-[[nodiscard]] std::string cache_edges_vertex_source(int light_count, const CacheRaster& raster);
-[[nodiscard]] std::string cache_edges_fragment_source(int light_count,
-                                                      const CacheRaster& raster,
-                                                      double most_turn);
+[[nodiscard]] std::string cache_sort_compute_source(int light_count,
+                                                    const CacheRaster& raster,
+                                                    double most_turn);
 [[nodiscard]] std::string cache_values_compute_source(const btf::ModelShader& shader);
 /// draw.frag's stand-in where the cache serves.
 [[nodiscard]] std::string draw_cached_fragment_source(const btf::ModelShader& shader,
@@ -42,11 +44,12 @@ struct CacheRaster {
 ///
 /// Directions in the local frame change slowly over a smooth surface, texels from pixel to pixel;
 /// so the error is that of linear interpolation over the turn between two nodes, which is bounded:
-/// a cell serves only where its four nodes see the surface, where no direction turns by more than
-/// most_turn between them, and where every vertex of the mesh inside it has the directions that its
-/// nodes tell. Other cells (silhouettes, seams of the tangents, tight curvature) are drawn per
-/// pixel. Hidden edges count too, which costs cells but no accuracy. Needs a current context,
-/// always the same.
+/// a cell serves only where its four nodes see the surface and no direction turns by more than
+/// most_turn between them, and a triangle is drawn from the cache only where all cells under it
+/// serve and the nodes tell the directions of its vertices. The others (silhouettes, seams of the
+/// tangents, tight curvature, triangles over the edge of the raster or over very many cells) are
+/// drawn per pixel. So a mesh of few large triangles gains nothing: tessellate it. Needs a current
+/// context, always the same.
 class AngularCache {
  public:
   /// @param shader  with a cache.
@@ -58,9 +61,9 @@ class AngularCache {
                                                    int height);
   /// Turns the raster's clip coordinates into the nodes'.
   [[nodiscard]] Eigen::Matrix4d nodes_from_clip() const;
-  /// Evaluates the nodes and decides on the cells. Uniform buffers hold the block Frame, once with
-  /// clip_from_object and once with nodes_from_clip() before it. Changes framebuffer, viewport,
-  /// program, texture and stencil bindings; leaves depth testing on.
+  /// Evaluates the nodes and sorts the mesh's triangles (MeshBuffers::draw_sorted). Uniform buffers
+  /// hold the block Frame, once with clip_from_object and once with nodes_from_clip() before it.
+  /// Changes framebuffer, viewport, program and bindings; leaves depth testing on.
   void fill(const MeshBuffers& mesh,
             const ModelTextures& textures,
             GLuint frame_block,
@@ -70,9 +73,6 @@ class AngularCache {
   /// Tells a program that draws from the cache which units those are.
   void assign(GLuint program) const;
   [[nodiscard]] std::size_t gpu_bytes() const;
-  /// The part of all cells that serve, of the last fill(). Waits for the GPU; for tests and
-  /// reports.
-  [[nodiscard]] double served() const;
 
  private:
   int columns_ = 0;  // of nodes
@@ -85,7 +85,7 @@ class AngularCache {
   double scale_y_ = 0;
   GlProgram nodes_program_;
   GlProgram cells_program_;
-  GlProgram edges_program_;
+  GlProgram sort_program_;
   GlProgram values_program_;
   GlTexture node_directions_;
   GlTexture node_depth_;

@@ -179,24 +179,19 @@ void DrawPass::draw(GLuint framebuffer, const MeshBuffers& mesh, const DrawInput
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_GREATER);
   glClearDepth(0.0);
-  glClearStencil(0);
   glClearColor(0.0F, 0.0F, 0.0F, 0.0F);
-  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT | GL_STENCIL_BUFFER_BIT);
+  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   textures_.bind();
   if (cache_) {
-    // What the cache can serve, and then the rest.
     cache_->bind();
-    glEnable(GL_STENCIL_TEST);
-    glStencilFunc(GL_ALWAYS, 1, 0xFF);
-    glStencilOp(GL_KEEP, GL_KEEP, GL_REPLACE);
     use(cached_program_);
+    mesh.draw_sorted(MeshBuffers::List::kCached);
+    use(program_);
+    mesh.draw_sorted(MeshBuffers::List::kPerPixel);
+  } else {
+    use(program_);
     mesh.draw();
-    glStencilFunc(GL_EQUAL, 0, 0xFF);
-    glStencilOp(GL_KEEP, GL_KEEP, GL_KEEP);
   }
-  use(program_);
-  mesh.draw();
-  glDisable(GL_STENCIL_TEST);
 }
 
 void DrawPass::use(const GlProgram& program) const {

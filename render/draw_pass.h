@@ -41,9 +41,8 @@ struct DrawInput {
   RigidTransform world_from_object;
 };
 
-/// Draws a mesh in a material, as the projector sees it, into an RGBA16F target with depth and
-/// stencil: XYZ in cd/m^2 and the geometric factor (surface.glsl). Needs a current context, always
-/// the same.
+/// Draws a mesh in a material, as the projector sees it, into an RGBA16F target with depth: XYZ in
+/// cd/m^2 and the geometric factor (surface.glsl). Needs a current context, always the same.
 class DrawPass {
  public:
   /// Errors: kUnavailable (the driver refuses the shader, a texture is too large).

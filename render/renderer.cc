@@ -79,7 +79,7 @@ class GlRenderer final : public Renderer {
     if (glCheckNamedFramebufferStatus(renderer->target_framebuffer_.id(), GL_FRAMEBUFFER) !=
         GL_FRAMEBUFFER_COMPLETE)
       return fail(Errc::kUnavailable,
-                  "making a renderer: this GL cannot draw to half floats with depth and stencil");
+                  "making a renderer: this GL cannot draw to half floats with depth");
     return renderer;
   }
 
@@ -135,13 +135,12 @@ class GlRenderer final : public Renderer {
         height_(geometry.height),
         mesh_(mesh),
         target_(make_texture_2d(GL_RGBA16F, width_, height_)),
-        depth_(make_texture_2d(GL_DEPTH32F_STENCIL8, width_, height_)),
+        depth_(make_texture_2d(GL_DEPTH_COMPONENT32F, width_, height_)),
         target_framebuffer_(make_framebuffer()),
         draw_(std::move(draw)),
         compensate_(std::move(compensate)) {
     glNamedFramebufferTexture(target_framebuffer_.id(), GL_COLOR_ATTACHMENT0, target_.id(), 0);
-    glNamedFramebufferTexture(
-        target_framebuffer_.id(), GL_DEPTH_STENCIL_ATTACHMENT, depth_.id(), 0);
+    glNamedFramebufferTexture(target_framebuffer_.id(), GL_DEPTH_ATTACHMENT, depth_.id(), 0);
   }
 
   // Rows come as they lie in the framebuffer, whose row 0 is the raster's first

@@ -38,10 +38,10 @@ Result<std::vector<ScreenQuery>> probe_screen(const MeshBuffers& mesh,
   const int width = profile.geometry.width;
   const int height = profile.geometry.height;
   const GlTexture target = make_texture_2d(GL_RGBA32F, width, height);
-  const GlTexture depth = make_texture_2d(GL_DEPTH32F_STENCIL8, width, height);
+  const GlTexture depth = make_texture_2d(GL_DEPTH_COMPONENT32F, width, height);
   const GlFramebuffer framebuffer = make_framebuffer();
   glNamedFramebufferTexture(framebuffer.id(), GL_COLOR_ATTACHMENT0, target.id(), 0);
-  glNamedFramebufferTexture(framebuffer.id(), GL_DEPTH_STENCIL_ATTACHMENT, depth.id(), 0);
+  glNamedFramebufferTexture(framebuffer.id(), GL_DEPTH_ATTACHMENT, depth.id(), 0);
 
   const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   const DirectionalLight unit{light.direction_to_light, Vector3d::Constant(std::numbers::pi)};

@@ -1,7 +1,6 @@
 // What a model's btf_radiance_cached() reads. Before this stand kCacheLayers (of a cluster) and
 // kCacheLightLayers (of all clusters).
 uniform sampler2DArray CacheValues;
-uniform usampler2D CacheCells;
 
 vec2 cache_place;  // of this pixel between the nodes
 int cache_layer;   // the first of the light in hand

@@ -10,6 +10,9 @@ out Surface {
   vec2 uv;
 } surface;
 
+// Two programs draw one mesh, and their triangles must meet.
+invariant gl_Position;
+
 void main() {
   surface.position = position;
   surface.normal = normal;

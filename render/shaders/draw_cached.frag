@@ -1,4 +1,4 @@
-// draw.frag with the directions' part read from the cache (angular_cache.h), where a cell has one.
+// draw.frag with the directions' part read from the cache (angular_cache.h).
 in Surface {
   vec3 position;
   vec3 normal;
@@ -9,10 +9,7 @@ in Surface {
 layout(location = 0) out vec4 target;
 
 void main() {
-  vec2 place = gl_FragCoord.xy / kSpacing;
-  if (texelFetch(CacheCells, ivec2(place), 0).r == 0u) discard;
-  cache_place = (place + 0.5) / vec2(textureSize(CacheValues, 0).xy);
-
+  cache_place = (gl_FragCoord.xy / kSpacing + kMargin + 0.5) / vec2(textureSize(CacheValues, 0).xy);
   vec3 rgb = vec3(0.0);
   for (int i = 0; i < LIGHT_COUNT; ++i) {
     cache_layer = i * kCacheLightLayers;
