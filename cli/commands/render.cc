@@ -29,11 +29,20 @@ Result<int> run_render(CommandLine& line) {
       ->capture_default_str();
   app.add_flag(
       "--uncompensated", uncompensated, "Send the target as if projector and surface were ideal");
+  app.add_option("--cache",
+                 options.cache.spacing,
+                 "Pixels between the nodes of the angular cache; 0 draws every pixel by itself")
+      ->capture_default_str();
+  app.add_option("--cache-turn",
+                 options.cache.most_turn,
+                 "The most that directions may turn between nodes, about radians")
+      ->capture_default_str();
   app.add_option("-o,--output",
                  out,
                  "frame.png: the drive codes; frame.exr: the luminance aimed at, XYZ in cd/m^2")
       ->required();
   line.parse();
+  VENEER_TRY(options.cache.check());
   if (out.extension() != ".png" && out.extension() != ".exr") {
     return fail(
         Errc::kInvalidOption, "writing {}: the name must end in .png or .exr", out.string());
