@@ -10,6 +10,7 @@ namespace veneer::simulation {
 
 [[nodiscard]] HeightField make_cloth(int size, std::uint64_t seed);
 [[nodiscard]] HeightField make_corrugated(int size, std::uint64_t seed);
+[[nodiscard]] HeightField make_corrugated_print(int size, std::uint64_t seed);
 [[nodiscard]] HeightField make_hammered(int size, std::uint64_t seed);
 [[nodiscard]] HeightField make_leather(int size, std::uint64_t seed);
 

@@ -22,7 +22,8 @@ TEST(Materials, AreFoundByNameAndOthersAreNot) {
   const auto none = find_height_field_material("granite");
   ASSERT_FALSE(none.has_value());
   EXPECT_EQ(none.error().code, Errc::kInvalidOption);
-  EXPECT_THAT(none.error().what, testing::HasSubstr("cloth, corrugated, hammered, leather"));
+  EXPECT_THAT(none.error().what,
+              testing::HasSubstr("cloth, corrugated, corrugated-print, hammered, leather"));
 }
 
 TEST(Materials, AreValidAtEverySize) {
@@ -104,6 +105,20 @@ TEST(Cloth, HasTwoThreadColoursInEqualParts) {
   const double share = static_cast<double>(cream) / static_cast<double>(field.surfaces.size());
   EXPECT_NEAR(share, 0.5, 0.1);
   EXPECT_GT(light / static_cast<double>(cream), 2.0 * dark / static_cast<double>(indigo));
+}
+
+TEST(Corrugated, HasThePrintOnTheSameRelief) {
+  const HeightField plain = (*find_height_field_material("corrugated"))->make(kSize, 1);
+  const HeightField print = (*find_height_field_material("corrugated-print"))->make(kSize, 1);
+  EXPECT_EQ(plain.heights, print.heights);
+  bool warm = false;
+  bool cold = false;
+  for (std::size_t i = 0; i < plain.surfaces.size(); ++i) {
+    EXPECT_GT(plain.surfaces[i].albedo[0], plain.surfaces[i].albedo[2]);
+    EXPECT_EQ(plain.surfaces[i].f0, print.surfaces[i].f0);
+    (print.surfaces[i].albedo[0] > print.surfaces[i].albedo[2] ? warm : cold) = true;
+  }
+  EXPECT_TRUE(warm && cold);
 }
 
 }  // namespace

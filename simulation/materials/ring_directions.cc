@@ -16,6 +16,7 @@ struct Ring {
   double first_azimuth_deg;
 };
 
+constexpr std::array kRings1{Ring{0, 1, 0}};
 constexpr std::array kRings25{Ring{0, 1, 0}, Ring{25, 4, 0}, Ring{50, 8, 0}, Ring{75, 12, 0}};
 constexpr std::array kRings49{
     Ring{0, 1, 0}, Ring{18.75, 6, 0}, Ring{37.5, 10, 0}, Ring{56.25, 14, 0}, Ring{75, 18, 0}};
@@ -46,6 +47,8 @@ btf::DirectionSet directions_of(std::span<const Ring> rings) {
 
 Result<btf::DirectionSet> ring_directions(int count) {
   switch (count) {
+    case 1:
+      return directions_of(kRings1);
     case 25:
       return directions_of(kRings25);
     case 49:
@@ -57,7 +60,7 @@ Result<btf::DirectionSet> ring_directions(int count) {
     default:
       return fail(
           Errc::kInvalidOption,
-          "choosing directions: there is no set of {}; there are sets of 25, 49, 81 and 151",
+          "choosing directions: there is no set of {}; there are sets of 1, 25, 49, 81 and 151",
           count);
   }
 }

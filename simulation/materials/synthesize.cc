@@ -22,6 +22,8 @@ constexpr std::array kMaterials{
     HeightFieldMaterial{
         "corrugated", "corrugated sheet with gloss (Obara et al. 2006)", &make_corrugated},
     HeightFieldMaterial{
+        "corrugated-print", "the same sheet with a print of all hues", &make_corrugated_print},
+    HeightFieldMaterial{
         "hammered", "hammered copper: tinted gloss, hardly any body colour", &make_hammered},
     HeightFieldMaterial{"leather", "pressed brown leather under a clear coat", &make_leather},
 };
