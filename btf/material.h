@@ -28,7 +28,7 @@ struct FitOptions {
   /// Eigen-BRDFs stored and fetched per texel: "4", or "3+1" for models of two scalar terms.
   std::string components = "4";
   /// Which way a model puts its terms together, where it offers several; empty takes its own
-  /// choice. dichromatic-lpca: "ratio" (default) or "subtractive".
+  /// choice. dichromatic-lpca: "learned" (default), "ratio" or "subtractive".
   std::string form;
   /// Nodes along each side of the square that directions are mapped to, for models drawn through
   /// Schneider's elevated concentric map. 4 to 32: the volume grows with the fourth power.

@@ -125,11 +125,13 @@ def main(argv=None):
     parser.add_argument("--components", type=int, nargs="+", default=[1, 2, 3, 4, 5, 6, 7, 8])
     parser.add_argument("--ours", type=int, nargs="+", default=[1, 2, 3, 4], help="n stands for n+n")
     parser.add_argument("--clusters", type=int, nargs="+", default=[8, 32])
+    parser.add_argument("--materials", type=pathlib.Path, help="a folder to keep what was fitted in")
     parser.add_argument("--svg", type=pathlib.Path, help="where to draw the curves")
     parser.add_argument("--json", type=pathlib.Path, help="where to write the rows")
     arguments = parser.parse_args(argv)
     rows = []
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = arguments.materials or scratch
         for clusters in arguments.clusters:
             wanted = [(arguments.rival, str(n)) for n in arguments.components]
             wanted += [(OURS, f"{n}+{n}") for n in arguments.ours]

@@ -68,9 +68,11 @@ class DichromaticTable(unittest.TestCase):
             program.chmod(0o755)
             rows = pathlib.Path(folder) / "rows.json"
             arguments = ["set", "--veneer", str(program), "--json", str(rows), "--clusters", "8"]
+            arguments += ["--materials", folder]
             with contextlib.redirect_stdout(io.StringIO()) as out:
                 dichromatic_table.main(arguments)
             self.assertEqual(len(json.loads(rows.read_text())), 8 + 4)
+            self.assertEqual(len(list(pathlib.Path(folder).glob("*.safetensors"))), 8 + 4)
         self.assertIn("| dichromatic-lpca | 2+2 | 8 | 0.02500 |", out.getvalue())
         self.assertIn("2+2, 8 clusters, rmse encoded: reached by lpca 4", out.getvalue())
 

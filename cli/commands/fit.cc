@@ -73,8 +73,9 @@ Result<int> run_fit(CommandLine& line) {
       ->capture_default_str();
   app.add_option("--lobes", options.lobes, "Lobes of a texel, for models made of them")
       ->capture_default_str();
-  app.add_option(
-      "--form", options.form, "How terms are put together; dichromatic-lpca: ratio, subtractive");
+  app.add_option("--form",
+                 options.form,
+                 "How terms are put together; dichromatic-lpca: learned, ratio, subtractive");
   app.add_option("--precision", options.precision, "8bit or float16, for models that offer both");
   app.add_option("--angular", options.angular, "Nodes along each side of the direction square")
       ->capture_default_str();

@@ -14,6 +14,7 @@ namespace veneer::btf {
 namespace {
 
 constexpr std::string_view kName = "dichromatic-lpca";
+constexpr std::string_view kLearned = "learned";
 constexpr std::string_view kRatio = "ratio";
 constexpr std::string_view kSubtractive = "subtractive";
 constexpr int kColours = 1;  // of a texel in the shader
@@ -32,12 +33,32 @@ using Half3 = Eigen::Matrix<Eigen::half, 3, 1>;
 
 // Everything that is the same for all texels.
 struct Terms {
+  std::string form;
   bool subtractive = false;
   Eigen::Vector3f specular_colour = Eigen::Vector3f::UnitX();
   Eigen::Vector3f shade_colour =
       Eigen::Vector3f::UnitX();  // of what shadows take away; subtractive
-  int masked_texels = 0;         // without body colour; ratio
+  int masked_texels = 0;         // without body colour; not subtractive
+
+  static Terms of(std::string form) {
+    Terms terms;
+    terms.subtractive = form == kSubtractive;
+    terms.form = std::move(form);
+    return terms;
+  }
 };
+
+Status check_form(std::string_view form, Errc code, std::string_view doing) {
+  if (form == kLearned || form == kRatio || form == kSubtractive) return {};
+  return fail(code,
+              "{}: form is \"{}\"; {} knows {}, {} and {}",
+              doing,
+              form,
+              kName,
+              kLearned,
+              kRatio,
+              kSubtractive);
+}
 
 bool lower(const Direction& a, const Direction& b) { return a.z() < b.z(); }
 
@@ -53,15 +74,24 @@ Eigen::Vector3f best_colour(const Eigen::Matrix3d& gram) {
   return (colour.sum() < 0.0 ? -colour : colour).cast<float>();
 }
 
+// Of a texel whose samples have this sum of outer products: the colour that explains most of their
+// energy, zero where the samples are under the noise.
+Eigen::Vector3f learned_colour(const Eigen::Matrix3d& gram, Eigen::Index samples) {
+  const double noise = static_cast<double>(kNoise);
+  if (!(gram.trace() >= noise * noise * static_cast<double>(samples)))
+    return Eigen::Vector3f::Zero();
+  return best_colour(gram);
+}
+
 Eigen::Vector3f colour_at(const std::vector<Eigen::half>& colours, int texel) {
   return Eigen::Map<const Half3>(colours.data() + 3 * texel).cast<float>();
 }
 
 class Dichromatic final : public Material {
  public:
-  /// @param reference  D_ref, [texel][3]
+  /// @param reference  D_ref, or a colour of length 1 or 0 where it is learned, [texel][3]
   Dichromatic(PackedLpca scalars, Terms terms, std::vector<Eigen::half> reference)
-      : scalars_(std::move(scalars)), terms_(terms), reference_(std::move(reference)) {
+      : scalars_(std::move(scalars)), terms_(std::move(terms)), reference_(std::move(reference)) {
     border_cosine_ = std::max(std::ranges::min_element(lights(), lower)->z(), kLeastCosine);
     colours_ = reference_;
     for (int i = 0; i < scalars_.frame().texel_count() && !terms_.subtractive; ++i)
@@ -69,7 +99,7 @@ class Dichromatic final : public Material {
           body_colour(colour_at(reference_, i)).cast<Eigen::half>();
   }
 
-  /// The direction of D_ref in RGB; zero where it is under the noise.
+  /// The direction of a reference in RGB; zero where it is under the noise.
   static Eigen::Vector3f body_colour(const Eigen::Vector3f& reference) {
     const float norm = reference.norm();
     return norm < kNoise ? Eigen::Vector3f::Zero() : Eigen::Vector3f(reference / norm);
@@ -121,7 +151,7 @@ class Dichromatic final : public Material {
   Contents contents() const override {
     Contents contents;
     scalars_.add_to(contents);
-    contents.metadata["form"] = terms_.subtractive ? kSubtractive : kRatio;
+    contents.metadata["form"] = terms_.form;
     contents.metadata["masked_texels"] = fmt::format("{}", terms_.masked_texels);
     contents.tensors.push_back(
         tensor_of("diffuse_reference", {scalars_.frame().texel_count(), 3}, reference_));
@@ -155,10 +185,12 @@ DirectionRole beyond(bool subtractive) {
 // Looks at all samples once, each rank at its own: the reference, the colours and how many texels
 // are masked.
 Terms find_terms(const SampleSet& set,
-                 bool subtractive,
+                 std::string form,
                  std::vector<Eigen::half>& reference,
                  Communicator& ranks,
                  Progress& progress) {
+  Terms terms = Terms::of(std::move(form));
+  const bool learned = terms.form == kLearned;
   const SampleSetInfo& info = set.info();
   const int reference_pair = nearest_normal(info.views) * static_cast<int>(info.lights.size()) +
                              nearest_normal(info.lights);
@@ -176,7 +208,10 @@ Terms find_terms(const SampleSet& set,
       const auto index = static_cast<std::size_t>(i);
       set.rgb(own.first + i, Part::kDiffuse, rgb);
       const Eigen::RowVector3f here = samples.row(reference_pair);
-      Eigen::Map<Half3>(reference.data() + 3 * i) = here.transpose().cast<Eigen::half>();
+      const Eigen::MatrixX3d diffuse = samples.cast<double>();
+      Eigen::Map<Half3>(reference.data() + 3 * i) =
+          (learned ? learned_colour(diffuse.transpose() * diffuse, pairs) : here.transpose())
+              .cast<Eigen::half>();
       const Eigen::MatrixX3d taken = (samples.rowwise() - here).cast<double>();
       shade[index] = taken.transpose() * taken;
       set.rgb(own.first + i, Part::kSpecular, rgb);
@@ -185,8 +220,6 @@ Terms find_terms(const SampleSet& set,
     }
     progress.advance(end - begin);
   });
-  Terms terms;
-  terms.subtractive = subtractive;
   // Of the specular parts, of the shading.
   std::array<Eigen::Matrix3d, 2> sums{Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Zero()};
   for (std::size_t i = 0; i < specular.size(); ++i) {
@@ -197,7 +230,7 @@ Terms find_terms(const SampleSet& set,
   terms.specular_colour = best_colour(sums[0]);
   terms.shade_colour = best_colour(sums[1]);
   reference = gather<Eigen::half>(ranks, reference);
-  for (int i = 0; i < info.texel_count() && !subtractive; ++i)
+  for (int i = 0; i < info.texel_count() && !terms.subtractive; ++i)
     if (colour_at(reference, i).norm() < kNoise) ++terms.masked_texels;
   progress.finish(terms.masked_texels == 0
                       ? std::string()
@@ -214,13 +247,8 @@ Result<std::unique_ptr<Material>> fit_dichromatic_lpca(const SampleSet& set,
   VENEER_TRY(refuse_precision(options, kName));
   VENEER_ASSIGN(const PackedLpca::Components components,
                 parse_two_terms(options.components, kName));
-  if (!options.form.empty() && options.form != kRatio && options.form != kSubtractive)
-    return fail(Errc::kInvalidOption,
-                "fit: form is \"{}\"; {} knows {} and {}",
-                options.form,
-                kName,
-                kRatio,
-                kSubtractive);
+  const std::string form = options.form.empty() ? std::string(kLearned) : options.form;
+  VENEER_TRY(check_form(form, Errc::kInvalidOption, "fit"));
   if (!set.info().polarised)
     return fail(
         Errc::kInvalidOption,
@@ -228,17 +256,16 @@ Result<std::unique_ptr<Material>> fit_dichromatic_lpca(const SampleSet& set,
         "capture the sample with polarisers",
         set.path().string(),
         kName);
-  const bool subtractive = options.form == kSubtractive;
   const MaterialFrame frame = frame_of(set.info());
   const PackedLpca::Layout layout{.components = components,
                                   .angular = options.angular,
-                                  .beyond = beyond(subtractive),
+                                  .beyond = beyond(form == kSubtractive),
                                   .colours = kColours};
   VENEER_TRY(PackedLpca::check(frame, layout, options.clusters, Errc::kInvalidOption, "fit"));
   VENEER_TRY(check_samples(set, options));
 
   std::vector<Eigen::half> reference;
-  const Terms terms = find_terms(set, subtractive, reference, *options.ranks, progress);
+  Terms terms = find_terms(set, form, reference, *options.ranks, progress);
   const auto read = [&](int texel, std::span<float> shading, std::span<float> specular) {
     std::vector<float> rgb(3 * shading.size());
     const Samples samples(rgb.data(), frame.pair_count(), 3);
@@ -253,20 +280,13 @@ Result<std::unique_ptr<Material>> fit_dichromatic_lpca(const SampleSet& set,
     Eigen::Map<Eigen::VectorXf>(specular.data(), samples.rows()) = samples * terms.specular_colour;
   };
   VENEER_ASSIGN(PackedLpca scalars, PackedLpca::fit(frame, options, layout, read, progress));
-  return std::make_unique<Dichromatic>(std::move(scalars), terms, std::move(reference));
+  return std::make_unique<Dichromatic>(std::move(scalars), std::move(terms), std::move(reference));
 }
 
 Result<std::unique_ptr<Material>> load_dichromatic_lpca(const SafetensorsFile& file) {
-  Terms terms;
   VENEER_ASSIGN(const std::string form, file.meta("form"));
-  if (form != kRatio && form != kSubtractive)
-    return fail(Errc::kBadFormat,
-                "reading {}: form is \"{}\"; this program knows {} and {}",
-                file.path().string(),
-                form,
-                kRatio,
-                kSubtractive);
-  terms.subtractive = form == kSubtractive;
+  VENEER_TRY(check_form(form, Errc::kBadFormat, fmt::format("reading {}", file.path().string())));
+  Terms terms = Terms::of(form);
   VENEER_ASSIGN(PackedLpca scalars, PackedLpca::load(file, beyond(terms.subtractive), kColours));
   const int texels = scalars.frame().texel_count();
   VENEER_ASSIGN(terms.masked_texels, read_integer(file, "masked_texels", 0, texels));
@@ -279,7 +299,7 @@ Result<std::unique_ptr<Material>> load_dichromatic_lpca(const SafetensorsFile& f
   }
   VENEER_ASSIGN(std::vector<Eigen::half> reference,
                 read_halves(file, "diffuse_reference", {texels, 3}));
-  return std::make_unique<Dichromatic>(std::move(scalars), terms, std::move(reference));
+  return std::make_unique<Dichromatic>(std::move(scalars), std::move(terms), std::move(reference));
 }
 
 }  // namespace veneer::btf
