@@ -11,8 +11,8 @@
 namespace veneer::btf {
 namespace {
 
-// Measured on the Bonn wallpaper, 2 lobes: powers 0, 0.3, 0.5, 0.8 leave an encoded epsilon of
-// .0390, .0380, .0379, .0392 and a linear rmse of .0370, .0379, .0393, .0429.
+// Measured on 16 x 16 texels of the Bonn wallpaper, 2 lobes: powers 0, 0.3, 0.5, 0.8 leave an
+// encoded epsilon of .0390, .0380, .0379, .0392 and a linear rmse of .0370, .0379, .0393, .0429.
 constexpr float kWeightPower = 0.3F;
 constexpr float kWeightFloor = 0.02F;
 constexpr std::size_t kChannels = 3;

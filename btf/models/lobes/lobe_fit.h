@@ -63,9 +63,10 @@ enum class Diffuse { kFree, kGiven };
 /// Fits cosine * (diffuse + specular * sum of lobes) to RGB by least squares: Levenberg and
 /// Marquardt over the lobes, with the colours (>= 0) eliminated by variable projection in Kaufman's
 /// approximation (Golub and Pereyra 1973; Kaufman 1975), so that all three channels share one Gram
-/// matrix a step. Lobes are added one at a time, each from the best of several starts on a part of
-/// the samples; the last refinement takes all. Exponents are bounded so that a lobe rises between
-/// and beyond the samples to at most four times what it has there. Deterministic; thread-safe.
+/// matrix a step. Lobes are added one at a time, each from the best of several starts, which a few
+/// steps on a part of the samples tell; the last refinement takes all. Exponents are bounded so
+/// that a lobe rises between and beyond the samples to at most four times what it has there.
+/// Deterministic; thread-safe.
 class LobeFitter {
  public:
   /// @param lobes  1 to 4. Samples: at least one row, finite.

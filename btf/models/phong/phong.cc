@@ -41,7 +41,7 @@ constexpr int kSections = 12;
 class PhongFitter {
  public:
   explicit PhongFitter(const MaterialFrame& frame) : samples_(pair_samples(frame)) {
-    constexpr float kTinyBase = 1e-15F;
+    constexpr float kTinyBase = 1e-6F;
     logarithm_ =
         (samples_.u.matrix() * Eigen::Vector3f(-1.0F, -1.0F, 1.0F)).array().max(kTinyBase).log();
   }
@@ -109,7 +109,10 @@ class PhongFitter {
                                float exponent) const {
     Solution solution;
     if (!(known.square > 0.0)) return solution;
-    const Eigen::VectorXf lobe = targets.weight * (exponent * logarithm_).exp();
+    // Floored so that squares do not underflow, which would take a hundred times as long.
+    constexpr float kLeastLogarithm = -30.0F;
+    const Eigen::VectorXf lobe =
+        targets.weight * (exponent * logarithm_).max(kLeastLogarithm).exp();
     const auto square = static_cast<double>(lobe.squaredNorm());
     const auto cross = static_cast<double>(lobe.dot(known.cosine));
     const auto by_grey = static_cast<double>(lobe.dot(known.grey));
