@@ -8,6 +8,7 @@
 #include "btf/importers/btfbase/btfbase.h"
 #include "btf/importers/crop.h"
 #include "btf/importers/merl/merl.h"
+#include "btf/importers/rgl/rgl.h"
 #include "btf/importers/rti/rti.h"
 #include "btf/importers/ubo2003/ubo2003.h"
 #include "btf/importers/ubo2014/ubo2014.h"
@@ -21,6 +22,7 @@ constexpr std::array kImporters{
              "text code-books of multi-level vector quantisation (Havran 2010)",
              &import_btfbase},
     Importer{"merl", "an isotropic BRDF of the MERL database (.binary)", &import_merl},
+    Importer{"rgl", "a BRDF of the RGL material database (.bsdf, the RGB variant)", &import_rgl},
     Importer{"rti", "a fixed camera and many lights: a .lp file and its pictures", &import_rti},
     Importer{"ubo2003",
              "a BTF of the University of Bonn as pictures (UBO2003, ATRIUM: a zip or a folder)",
