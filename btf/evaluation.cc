@@ -29,12 +29,35 @@ constexpr std::int64_t kDrawnSamples = 200'000;
 // threads.
 constexpr std::int64_t kGroups = 64;
 
-// Sums over the texels of one group.
+// Of the texels of one group, in one domain.
 struct Sums {
-  Eigen::ArrayXd linear;  // of |difference| for each pair, over channels
-  Eigen::ArrayXd encoded;
-  double linear_squares = 0.0;
-  double encoded_squares = 0.0;
+  Eigen::ArrayXd images;  // of |difference| for each pair, over texels and channels
+  double squares = 0.0;
+  double texel_min = std::numeric_limits<double>::infinity();  // of |difference| over one texel
+  double texel_max = 0.0;
+
+  explicit Sums(Eigen::Index pairs = 0) : images(Eigen::ArrayXd::Zero(pairs)) {}
+  // One texel's differences, [pair][channel].
+  void add(const Eigen::ArrayXf& difference) {
+    const Eigen::ArrayXd of_pairs =
+        Eigen::Map<const Eigen::Array3Xf>(difference.data(), 3, images.size())
+            .abs()
+            .colwise()
+            .sum()
+            .transpose()
+            .cast<double>();
+    images += of_pairs;
+    squares += difference.cast<double>().square().sum();
+    const double texel = of_pairs.sum();
+    texel_min = std::min(texel_min, texel);
+    texel_max = std::max(texel_max, texel);
+  }
+  void add(const Sums& other) {
+    images += other.images;
+    squares += other.squares;
+    texel_min = std::min(texel_min, other.texel_min);
+    texel_max = std::max(texel_max, other.texel_max);
+  }
 };
 
 Eigen::ArrayXf encode(const Eigen::ArrayXf& linear) { return linear.pow(kEncodingExponent); }
@@ -87,12 +110,15 @@ Lab lab_of(const Eigen::Vector3d& srgb) {
   return lab_from_xyz(xyz_from_srgb() * srgb, kWhite);
 }
 
-ImageError image_error(const Eigen::ArrayXd& sums, double squares, const SampleSetInfo& info) {
+ImageError image_error(const Sums& sums, const SampleSetInfo& info) {
   const double per_image = 3.0 * info.texel_count();
-  return {sums.mean() / per_image,
-          sums.minCoeff() / per_image,
-          sums.maxCoeff() / per_image,
-          std::sqrt(squares / (per_image * static_cast<double>(sums.size())))};
+  const double per_texel = 3.0 * info.pair_count();
+  return {sums.images.mean() / per_image,
+          sums.images.minCoeff() / per_image,
+          sums.images.maxCoeff() / per_image,
+          std::sqrt(sums.squares / (per_image * info.pair_count())),
+          sums.texel_min / per_texel,
+          sums.texel_max / per_texel};
 }
 
 // The i-th of `count` texels spread over the sample: all in order where it has no more, else
@@ -148,7 +174,8 @@ Result<Evaluation> evaluate(const SampleSet& set, const Material& material, Prog
   const std::int64_t group_count = std::min(kGroups, texels);
   const std::int64_t colours_per_texel =
       std::min<std::int64_t>((kColourSamples + texels - 1) / texels, pairs);
-  std::vector<Sums> groups(static_cast<std::size_t>(group_count));
+  std::vector<Sums> linear(static_cast<std::size_t>(group_count));
+  std::vector<Sums> encoded(static_cast<std::size_t>(group_count));
   std::vector<double> differences(static_cast<std::size_t>(texels * colours_per_texel));
   std::vector<int> non_finite(static_cast<std::size_t>(group_count), 0);
 
@@ -157,8 +184,8 @@ Result<Evaluation> evaluate(const SampleSet& set, const Material& material, Prog
     Eigen::ArrayXf measured(pairs * 3);
     Eigen::ArrayXf modelled(pairs * 3);
     for (std::int64_t g = first_group; g < last_group; ++g) {
-      Sums& sums = groups[static_cast<std::size_t>(g)];
-      sums.linear = sums.encoded = Eigen::ArrayXd::Zero(pairs);
+      Sums linear_sums(pairs);
+      Sums encoded_sums(pairs);
       for (std::int64_t t = g * texels / group_count; t < (g + 1) * texels / group_count; ++t) {
         const auto texel = static_cast<int>(t);
         set.rgb(texel, Part::kTotal, {measured.data(), static_cast<std::size_t>(measured.size())});
@@ -166,18 +193,8 @@ Result<Evaluation> evaluate(const SampleSet& set, const Material& material, Prog
         if (!modelled.allFinite()) ++non_finite[static_cast<std::size_t>(g)];
         measured = measured.max(0.0F).min(1.0F);
         modelled = modelled.max(0.0F).min(1.0F);
-        const auto add =
-            [pairs](const Eigen::ArrayXf& difference, Eigen::ArrayXd& sum, double& squares) {
-              sum += Eigen::Map<const Eigen::Array3Xf>(difference.data(), 3, pairs)
-                         .abs()
-                         .colwise()
-                         .sum()
-                         .transpose()
-                         .cast<double>();
-              squares += difference.cast<double>().square().sum();
-            };
-        add(measured - modelled, sums.linear, sums.linear_squares);
-        add(encode(measured) - encode(modelled), sums.encoded, sums.encoded_squares);
+        linear_sums.add(measured - modelled);
+        encoded_sums.add(encode(measured) - encode(modelled));
         auto out = differences.begin() + t * colours_per_texel;
         for (const int pair : choose_pairs(
                  static_cast<int>(pairs), colours_per_texel, static_cast<std::uint64_t>(t))) {
@@ -187,6 +204,8 @@ Result<Evaluation> evaluate(const SampleSet& set, const Material& material, Prog
         }
         progress.advance();
       }
+      linear[static_cast<std::size_t>(g)] = std::move(linear_sums);
+      encoded[static_cast<std::size_t>(g)] = std::move(encoded_sums);
     }
   });
   if (const int count = std::accumulate(non_finite.begin(), non_finite.end(), 0); count > 0) {
@@ -198,16 +217,13 @@ Result<Evaluation> evaluate(const SampleSet& set, const Material& material, Prog
         count);
   }
 
-  Sums total = std::move(groups.front());
-  for (std::size_t g = 1; g < groups.size(); ++g) {
-    total.linear += groups[g].linear;
-    total.encoded += groups[g].encoded;
-    total.linear_squares += groups[g].linear_squares;
-    total.encoded_squares += groups[g].encoded_squares;
+  for (std::size_t g = 1; g < linear.size(); ++g) {
+    linear.front().add(linear[g]);
+    encoded.front().add(encoded[g]);
   }
   Evaluation result;
-  result.linear = image_error(total.linear, total.linear_squares, info);
-  result.encoded = image_error(total.encoded, total.encoded_squares, info);
+  result.linear = image_error(linear.front(), info);
+  result.encoded = image_error(encoded.front(), info);
   result.psnr_db = result.encoded.rmse > 0.0 ? -20.0 * std::log10(result.encoded.rmse)
                                              : std::numeric_limits<double>::infinity();
   result.de00_mean = mean(differences);

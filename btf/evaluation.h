@@ -8,12 +8,14 @@
 namespace veneer::btf {
 
 /// Error over all texels, pairs and channels. epsilon is the mean absolute difference (Meseth et
-/// al. 2003, section 5), its min and max are over the (view, light) images.
+/// al. 2003, section 4.1).
 struct ImageError {
   double epsilon_avg{};
-  double epsilon_min{};
-  double epsilon_max{};
+  double epsilon_min{};  ///< of the (view, light) image that is met best
+  double epsilon_max{};  ///< of the image that is met worst
   double rmse{};
+  double texel_min{};  ///< epsilon of the texel that is met best, over its pairs and channels
+  double texel_max{};  ///< of the texel that is met worst; the tables of Meseth et al. give these
 };
 
 /// How well a material reproduces a sample set at the measured directions.

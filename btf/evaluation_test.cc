@@ -122,6 +122,20 @@ TEST_F(Evaluate, ImagesAreOneViewAndLightEach) {
   EXPECT_NEAR(result->linear.rmse, 0.1 / std::sqrt(18.0), kFloat);
 }
 
+TEST_F(Evaluate, TexelsHaveTheirOwnLeastAndLargestError) {
+  // Texel 7 is off by 0.2 in one of six pairs, texel 2 by 0 everywhere, the others by 0.1.
+  const auto result = with([](int t, int v, int l) {
+    if (t == 2) return 0.0F;
+    return t == 7 && v == 0 && l == 1 ? 0.2F : 0.1F;
+  });
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->linear.texel_min, 0.0);
+  EXPECT_NEAR(result->linear.texel_max, 0.7 / 6.0, kFloat);
+  EXPECT_NEAR(result->linear.epsilon_avg, (13 * 0.1 + 0.7 / 6.0) / 15.0, kFloat);
+  EXPECT_EQ(result->encoded.texel_min, 0.0);
+  EXPECT_GT(result->encoded.texel_max, result->encoded.epsilon_avg);
+}
+
 TEST_F(Evaluate, BothSidesAreCutToTheUnitRange) {
   const auto above = with([](int, int, int) { return 100.0F; });
   ASSERT_TRUE(above);

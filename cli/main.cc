@@ -22,6 +22,9 @@ struct Command {
 constexpr std::array kCommands{
     Command{"bench", "Time what this machine does: bench render, bench fit", &cli::run_bench},
     Command{"calibrate", "Measure a projector and write its profile", &cli::run_calibrate},
+    Command{"compare",
+            "Fit every model of the literature and print the published tables",
+            &cli::run_compare},
     Command{"demo",
             "Run the main job without hardware and report what the eye receives",
             &cli::run_demo},

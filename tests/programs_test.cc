@@ -245,6 +245,34 @@ TEST_F(ProgramsTest, JsonIsAloneOnStandardOutput) {
                   .err.empty());
 }
 
+TEST_F(ProgramsTest, CompareGivesThePublishedTablesOfASet) {
+  const Outcome outcome = run("veneer compare " + text("cloth.btfset") +
+                              " --tables --models lpca,phong --size 64x48 --frames 3 --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  ASSERT_EQ(json.at("models").size(), 2U);
+  const auto& lpca = json.at("models").at(0);
+  EXPECT_EQ(lpca.at("published").at("label"), "LPCA");
+  EXPECT_DOUBLE_EQ(lpca.at("values_per_texel"), 1 + 8 + 3 * 25 * 25 * 8 * 32 / 64.0);
+  EXPECT_LE(lpca.at("epsilon").at("min"), lpca.at("epsilon").at("avg"));
+  EXPECT_LE(lpca.at("epsilon").at("avg"), lpca.at("epsilon").at("max"));
+  EXPECT_GT(json.at("models").at(1).at("epsilon").at("avg"), lpca.at("epsilon").at("avg"));
+  EXPECT_TRUE(json.at("published_material").is_null());
+  EXPECT_TRUE(json.at("values_differ").empty());
+  EXPECT_GT(lpca.at("ms_median"), 0.0);
+  EXPECT_GT(json.at("plain_ms"), 0.0);
+
+  EXPECT_EQ(run("veneer compare " + text("cloth.btfset") + " --tables 2 --models phong -o " +
+                text("tables.md"))
+                .exit_code,
+            0);
+  const std::string tables = read_text(at("tables.md")).value();
+  EXPECT_NE(tables.find("### Table 2"), std::string::npos) << tables;
+  EXPECT_EQ(tables.find("### Table 3"), std::string::npos) << tables;
+  EXPECT_TRUE(fails(
+      run("veneer compare " + text("cloth.btfset") + " --models granite"), 2, "there is no model"));
+}
+
 TEST_F(ProgramsTest, TheDaemonMakesTheSameFramesTwice) {
   for (const char* name : {"first", "second"}) {
     const Outcome outcome =

@@ -12,7 +12,9 @@ nlohmann::ordered_json to_json(const btf::ImageError& error) {
   return {{"epsilon_avg", error.epsilon_avg},
           {"epsilon_min", error.epsilon_min},
           {"epsilon_max", error.epsilon_max},
-          {"rmse", error.rmse}};
+          {"rmse", error.rmse},
+          {"texel_min", error.texel_min},
+          {"texel_max", error.texel_max}};
 }
 
 }  // namespace
