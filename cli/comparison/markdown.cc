@@ -178,8 +178,8 @@ std::string table3(const Comparison& comparison) {
       "instructions that compute in the shader compiled to SPIR-V, with functions inlined and "
       "loops "
       "written out; a vector's count as one; moves, fetches and branches do not count. The paper "
-      "counts fragment instructions of its own programs, which find directions in the vertex "
-      "program or in cube maps.";
+      "counts the fragment operations of its own programs, whose vertex programs compute the local "
+      "directions.";
   text +=
       comparison.no_cost.empty() ? "\n" : fmt::format(" Not counted: {}.\n", comparison.no_cost);
   text +=
