@@ -12,10 +12,13 @@ def main():
     rows = report["results"]
     width = max(len(row["name"]) for row in rows)
     print(report["renderer"])
-    print(f"{'':{width}}  {'ms':>8}  {'x plain':>7}  {'fetches':>7}")
+    print(f"{'':{width}}  {'ms':>8}  {'x plain':>7}  {'fetches':>7}  {'epsilon':>7}  {'cached':>6}")
     for row in rows:
+        epsilon = f"{row['screen_epsilon']:.4f}" if "screen_epsilon" in row else ""
+        cached = f"{100 * row['served']:.0f} %" if "served" in row else ""
         print(
-            f"{row['name']:{width}}  {row['ms_median']:8.2f}  {row['ratio']:7.2f}  {row['fetches']:7d}"
+            f"{row['name']:{width}}  {row['ms_median']:8.2f}  {row['ratio']:7.2f}"
+            f"  {row['fetches']:7d}  {epsilon:>7}  {cached:>6}"
         )
 
 

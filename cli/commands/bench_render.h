@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "cli/command_line.h"
+#include "render/angular_cache_options.h"
+
+namespace veneer::cli {
+
+struct BenchRenderOptions {
+  std::string size = "1024x768";  ///< pixels
+  int frames = 40;
+  /// What is timed; a fixed list of models where it is empty.
+  std::vector<std::filesystem::path> materials;
+  /// What the list is fitted to and everything drawn is compared with; a small synthetic cloth, and
+  /// no comparison, where it is empty.
+  std::filesystem::path set;
+  /// With a spacing, whatever offers a cache is timed with it too.
+  render::AngularCacheOptions cache;
+};
+
+/// Times what drawing a frame costs with each model, all draws taking turns, and prints it.
+/// Errors: kInvalidOption, those of opening and fitting, kUnavailable (no GL).
+[[nodiscard]] Result<int> bench_render(const BenchRenderOptions& options, CommandLine& line);
+
+}  // namespace veneer::cli
