@@ -29,7 +29,7 @@ TEST(Config, ReadsEveryKey) {
   ASSERT_TRUE(
       read("clock = \"virtual\"\nframes = 12\nframe_rate_hz = 50\ndisplay_latency_ms = 30\n"
            "summary = \"s.json\"\n[render]\ncompensate = false\ndither = false\n"
-           "geometry_floor = 0.1\ncache_spacing_px = 16\ncache_most_turn = "
+           "geometry_floor = 0.1\naverage_texels = true\ncache_spacing_px = 16\ncache_most_turn = "
            "0.2\n[prediction]\nhorizon_s = 0.1\n",
            &config));
   EXPECT_EQ(config.clock, ClockKind::kVirtual);
@@ -37,6 +37,7 @@ TEST(Config, ReadsEveryKey) {
   EXPECT_EQ(config.frame_rate_hz, 50);
   EXPECT_FALSE(config.render.compensate);
   EXPECT_EQ(config.render.geometry_floor, 0.1);
+  EXPECT_TRUE(config.render.average_texels);
   EXPECT_EQ(config.render.cache.spacing, 16);
   EXPECT_EQ(config.render.cache.most_turn, 0.2);
   EXPECT_EQ(config.prediction.horizon_s, 0.1);

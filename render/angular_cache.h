@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include <cstddef>
+#include <optional>
 #include <string>
 
 #include "btf/model_shader.h"
@@ -15,6 +16,10 @@
 #include "render/model_textures.h"
 
 namespace veneer::render {
+
+/// Texels of the sample, where what they show is averaged over a pixel (texels.glsl); none where a
+/// pixel shows the texel at its centre.
+using AverageOver = std::optional<Eigen::Vector2i>;
 
 /// Nodes beyond each edge of the raster.
 inline constexpr int kCacheMargin = 1;
@@ -36,7 +41,8 @@ struct CacheRaster {
 /// draw.frag's stand-in where the cache serves.
 [[nodiscard]] std::string draw_cached_fragment_source(const btf::ModelShader& shader,
                                                       int light_count,
-                                                      int spacing);
+                                                      int spacing,
+                                                      const AverageOver& average_over = {});
 
 /// What depends on directions alone in a clustered model, evaluated at nodes every few pixels and
 /// interpolated between them by the texture units. Node (i, j) lies at the corner (i, j) * spacing

@@ -83,7 +83,8 @@ class AngularCacheTest : public ::testing::Test {
              const std::vector<Light>& lights,
              const AngularCacheOptions& options) {
     const MeshBuffers buffers(mesh);
-    const auto pass = DrawPass::create(smooth_model(), lights, {1, 1}, profile_, options);
+    const auto pass =
+        DrawPass::create(smooth_model(), lights, {1, 1}, profile_, {.cache = options});
     EXPECT_TRUE(pass) << pass.error().what;
     Drawn drawn;
     drawn.pixels.resize(kWidth * kHeight);

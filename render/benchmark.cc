@@ -127,11 +127,13 @@ class Bench {
         "plain",
         plain,
         DrawPass::create_plain(plain, kLight, bench.repeats(kPlainTexels, kPlainTexels), profile)));
-    for (const auto& [name, material, cache] : options.materials) {
+    for (const auto& [name, material, cache, average_texels] : options.materials) {
       const btf::ModelShader shader = material->shader();
       const Eigen::Vector2d repeats = bench.repeats(material->width(), material->height());
+      DrawOptions draw{.cache = cache};
+      if (average_texels) draw.average_over = {material->width(), material->height()};
       VENEER_TRY(
-          bench.add(name, shader, DrawPass::create(shader, {kLight}, repeats, profile, cache)));
+          bench.add(name, shader, DrawPass::create(shader, {kLight}, repeats, profile, draw)));
     }
     bench.entrants_.emplace_back().timing.name = "compensation";
     return bench;

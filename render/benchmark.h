@@ -20,6 +20,7 @@ struct RenderBenchMaterial {
   std::shared_ptr<const btf::Material>
       material;  ///< shared: the caller may time it in several runs
   AngularCacheOptions cache{};
+  bool average_texels = false;  ///< as RendererOptions has it
 };
 
 struct RenderBenchOptions {

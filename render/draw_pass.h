@@ -7,6 +7,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/rigid_transform.h"
@@ -20,6 +21,11 @@
 
 namespace veneer::render {
 
+struct DrawOptions {
+  AngularCacheOptions cache{};
+  AverageOver average_over{};
+};
+
 /// Clip coordinates from the projector's frame. Row 0 of the framebuffer is the first row of the
 /// raster, so that nothing needs flipping and gl_FragCoord is the projector's pixel coordinate.
 /// Depth is near / z in [0, 1], larger is nearer: a float keeps its precision at any distance.
@@ -31,7 +37,11 @@ inline constexpr double kNearPlane = 0.01;  // metres
 [[nodiscard]] std::string draw_vertex_source(int light_count);
 /// What fragment shaders of the surface begin with: version, uniforms and surface.glsl.
 [[nodiscard]] std::string surface_header(int light_count);
-[[nodiscard]] std::string draw_fragment_source(const std::string& model_source, int light_count);
+[[nodiscard]] std::string draw_fragment_source(const std::string& model_source,
+                                               int light_count,
+                                               const AverageOver& average_over = {});
+/// Defines RADIANCE(uv, view, light), what a pixel shows of the model's function `sample`.
+[[nodiscard]] std::string radiance_source(std::string_view sample, const AverageOver& average_over);
 /// The same for the benchmark's yardstick, plain.frag, which reads the texture "Albedo".
 [[nodiscard]] std::string plain_fragment_source();
 
@@ -50,7 +60,7 @@ class DrawPass {
                                                std::vector<Light> lights,
                                                const Eigen::Vector2d& texture_repeats,
                                                const calibration::ProjectorProfile& profile,
-                                               const AngularCacheOptions& cache = {});
+                                               const DrawOptions& options = {});
   /// The yardstick of the benchmark, for one directional light; `textures` holds "Albedo".
   [[nodiscard]] static Result<DrawPass> create_plain(const btf::ModelShader& textures,
                                                      const DirectionalLight& light,
@@ -66,8 +76,7 @@ class DrawPass {
            const Eigen::Vector2d& texture_repeats,
            const calibration::ProjectorProfile& profile);
   [[nodiscard]] Status link(const std::string& fragment_source, const btf::ModelShader& textures);
-  [[nodiscard]] Status add_cache(const btf::ModelShader& shader,
-                                 const AngularCacheOptions& options);
+  [[nodiscard]] Status add_cache(const btf::ModelShader& shader, const DrawOptions& options);
   void use(const GlProgram& program) const;
   GlProgram program_;
   ModelTextures textures_;

@@ -18,12 +18,13 @@ class ShaderMaterial final : public btf::Material {
  public:
   explicit ShaderMaterial(btf::ModelShader shader) : shader_(std::move(shader)) {}
   /// @param body  of `vec3 btf_radiance(vec2 uv, vec3 view, vec3 light)`.
-  explicit ShaderMaterial(const std::string& body) {
+  explicit ShaderMaterial(const std::string& body, int width = 1, int height = 1)
+      : width_(width), height_(height) {
     shader_.source = "vec3 btf_radiance(vec2 uv, vec3 view, vec3 light) {" + body + "}";
   }
   [[nodiscard]] std::string_view model() const override { return "shader"; }
-  [[nodiscard]] int width() const override { return 1; }
-  [[nodiscard]] int height() const override { return 1; }
+  [[nodiscard]] int width() const override { return width_; }
+  [[nodiscard]] int height() const override { return height_; }
   [[nodiscard]] const btf::DirectionSet& views() const override { return none_; }
   [[nodiscard]] const btf::DirectionSet& lights() const override { return none_; }
   void reconstruct(int /*texel*/, std::span<float> /*rgb*/) const override {}
@@ -37,6 +38,8 @@ class ShaderMaterial final : public btf::Material {
   [[nodiscard]] Contents contents() const override { return {}; }
 
  private:
+  int width_ = 1;
+  int height_ = 1;
   btf::ModelShader shader_;
   btf::DirectionSet none_;
 };

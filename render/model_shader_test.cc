@@ -275,7 +275,7 @@ TEST(ModelShaders, CachedDrawsFollowThePerPixelDraw) {
     std::vector<std::vector<Vector4f>> drawn;
     for (const AngularCacheOptions& cache :
          {AngularCacheOptions{}, AngularCacheOptions{.spacing = 4, .most_turn = 0.2}}) {
-      const auto pass = DrawPass::create(shader, lights, {5, 5}, profile, cache);
+      const auto pass = DrawPass::create(shader, lights, {5, 5}, profile, {.cache = cache});
       ASSERT_TRUE(pass) << pass.error().what;
       pass->draw(framebuffer.id(), mesh, input);
       glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer.id());

@@ -68,10 +68,12 @@ class GlRenderer final : public Renderer {
                                                   const btf::Material& material,
                                                   const calibration::ProjectorProfile& profile,
                                                   const RendererOptions& options) {
+    DrawOptions draw_options{.cache = options.cache};
+    if (options.average_texels) draw_options.average_over = {material.width(), material.height()};
     VENEER_ASSIGN(
         DrawPass draw,
         DrawPass::create(
-            material.shader(), scene.lights, scene.texture_repeats, profile, options.cache));
+            material.shader(), scene.lights, scene.texture_repeats, profile, draw_options));
     const Compensation compensation(profile, options);
     VENEER_ASSIGN(CompensatePass compensate, CompensatePass::create(compensation, profile));
     auto renderer = std::unique_ptr<GlRenderer>(new GlRenderer(

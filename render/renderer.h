@@ -26,6 +26,9 @@ struct RendererOptions {
   /// Below this G a point is out of the projector's reach and stays black. > 0.
   double geometry_floor = 0.05;
   AngularCacheOptions cache{};
+  /// Each pixel shows the mean of the texels under it, up to two along each side, in place of the
+  /// texel at its centre: four evaluations, and no jagged edges between texels.
+  bool average_texels = false;
 };
 
 /// What one frame needs to know.

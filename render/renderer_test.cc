@@ -206,6 +206,55 @@ TEST_F(RendererTest, ShowsTheFirstTexelAtTheUpperLeft) {
   });
 }
 
+// A checkerboard of black and white texels, each a little larger than a pixel.
+TEST_F(RendererTest, AveragesTheTexelsUnderAPixel) {
+  const ShaderMaterial checker(
+      "ivec2 t = ivec2(floor(uv * 40.0)); return vec3(float((t.x + t.y) & 1));", 40, 40);
+  Scene scene = plate_scene();
+  const FrameInput input{{0, 0, 1}, {}, 0};
+  const auto draw = [&](bool average) {
+    const auto renderer = make(scene, checker, {.average_texels = average});
+    renderer->draw(input);
+    Image<Rgb32f> target(kWidth, kHeight);
+    renderer->read_target(target.view());
+    return target;
+  };
+  const Image<Rgb32f> nearest = draw(false);
+  const Image<Rgb32f> averaged = draw(true);
+  // The truth: 16 x 16 rays through each pixel. The pixel's sides on the plate are not quite the
+  // texels' directions (the projector looks down a little), and the footprint is taken as their
+  // box.
+  constexpr int kRays = 16;
+  double nearest_error = 0;
+  double averaged_error = 0;
+  int compared = 0;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      double white = 0;
+      bool inside = true;
+      for (int i = 0; i < kRays * kRays; ++i) {
+        const auto point = point_on_plate(
+            profile_.geometry, input, x + (i % kRays + 0.5) / kRays, y + (i / kRays + 0.5) / kRays);
+        inside = inside && point;
+        if (!point) break;
+        const int column = static_cast<int>(std::floor((point->x() / 0.2 + 0.5) * 40));
+        const int row = static_cast<int>(std::floor((0.5 - point->y() / 0.2) * 40));
+        white += ((column + row) & 1) / double(kRays * kRays);
+      }
+      if (!inside) continue;
+      const auto shown = [&](const Image<Rgb32f>& image) {
+        return (srgb_from_xyz() * image(x, y).cast<double>()).y();
+      };
+      nearest_error += std::abs(shown(nearest) - white);
+      averaged_error += std::abs(shown(averaged) - white);
+      ++compared;
+    }
+  }
+  ASSERT_GT(compared, 500);
+  EXPECT_GT(nearest_error / compared, 0.1) << "nothing to average";
+  EXPECT_LT(averaged_error / compared, 0.02);
+}
+
 TEST_F(RendererTest, ShowsTheNearSideOfASphere) {
   const Scene scene =
       scene_of("sphere", DirectionalLight{Vector3d::UnitZ(), Vector3d::Constant(kPi)});

@@ -21,6 +21,9 @@ TEST(Shaders, AreValidByTheReferenceCompiler) {
   for (const int lights : {1, kMaxLights}) {
     EXPECT_EQ(glslang_complaints(draw_vertex_source(lights), "vert"), "");
     EXPECT_EQ(glslang_complaints(draw_fragment_source(kAnyModel, lights), "frag"), "");
+    EXPECT_EQ(
+        glslang_complaints(draw_fragment_source(kAnyModel, lights, Eigen::Vector2i(4, 3)), "frag"),
+        "");
   }
 }
 

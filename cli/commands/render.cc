@@ -29,6 +29,9 @@ Result<int> run_render(CommandLine& line) {
       ->capture_default_str();
   app.add_flag(
       "--uncompensated", uncompensated, "Send the target as if projector and surface were ideal");
+  app.add_flag("--average-texels",
+               options.average_texels,
+               "Show the mean of the texels under a pixel, not the one at its centre");
   app.add_option("--cache",
                  options.cache.spacing,
                  "Pixels between the nodes of the angular cache; 0 draws every pixel by itself")

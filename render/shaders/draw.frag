@@ -16,7 +16,7 @@ void main() {
   vec3 rgb = vec3(0.0);
   for (int i = 0; i < LIGHT_COUNT; ++i) {
     vec4 light = light_at(i, surface.position);
-    rgb += btf_radiance(surface.uv, view, light.xyz * object_from_local) *
+    rgb += RADIANCE(surface.uv, view, light.xyz * object_from_local) *
            (frame.light_rgb[i].rgb * light.w);
   }
   target = target_of(rgb, projector_geometry(normal, surface.position));

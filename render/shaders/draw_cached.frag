@@ -13,7 +13,7 @@ void main() {
   vec3 rgb = vec3(0.0);
   for (int i = 0; i < LIGHT_COUNT; ++i) {
     cache_layer = i * kCacheLightLayers;
-    rgb += btf_radiance_cached(surface.uv) *
+    rgb += RADIANCE(surface.uv, vec3(0.0), vec3(0.0)) *
            (frame.light_rgb[i].rgb * light_at(i, surface.position).w);
   }
   target = target_of(rgb, projector_geometry(normalize(surface.normal), surface.position));
