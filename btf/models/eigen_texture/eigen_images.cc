@@ -175,7 +175,9 @@ EigenImages fit_eigen_images(const SampleSet& set,
     }
 
   const bool bytes = precision == Precision::k8Bit;
-  EigenImages images{.components = components, .precision = precision};
+  EigenImages images;
+  images.components = components;
+  images.precision = precision;
   // What a stored value of 1 stands for.
   std::vector<float> scales(ranges.size());
   for (std::size_t i = 0; i < count && bytes; ++i)
