@@ -24,6 +24,14 @@ inline Direction random_direction(Pcg32& random, double lowest_z = 0.0) {
   return {radius * std::cos(phi), radius * std::sin(phi), z};
 }
 
+/// The normal, and `count` directions around it at polar angle `theta`.
+inline DirectionSet ring(int count, double theta) {
+  DirectionSet directions{Direction::UnitZ()};
+  for (int i = 0; i < count; ++i)
+    directions.push_back(direction_from_angles({theta, 2.0 * std::numbers::pi * i / count}));
+  return directions;
+}
+
 /// The value of a channel of a sample: sample(texel, view, light, channel).
 using SampleFunction = std::function<float(int, int, int, int)>;
 

@@ -39,6 +39,7 @@ set(VENEER_MODEL_TESTS
   models/lafortune/lafortune_test.cc
   models/lobes/lobe_fit_test.cc
   models/lobes/lobe_models_test.cc
+  models/load_material_test.cc
   models/local_pca_test.cc
   models/models_test.cc
   models/real_material_test.cc

@@ -4,92 +4,31 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
-#include <functional>
 #include <limits>
 
 #include "btf/internal_test_sets.h"
 #include "btf/interpolated_set.h"
 #include "btf/material.h"
+#include "btf/models/internal_test_models.h"
 
 // Laws that hold for every model, and those of each.
 namespace veneer::btf {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::components_of;
+using testing::cosine;
+using testing::dichromatic;
+using testing::dichromatic_set;
+using testing::fit;
+using testing::kHalfTolerance;
+using testing::largest_error;
 using testing::make_set;
+using testing::options_with;
 using testing::random_direction;
-
-// Factors, weights and colours are float16: 2^-11 each, for values up to 1.
-constexpr double kHalfTolerance = 4e-3;
-
-DirectionSet ring(int count, double theta) {
-  DirectionSet directions{Direction::UnitZ()};
-  for (int i = 0; i < count; ++i)
-    directions.push_back(direction_from_angles({theta, 2.0 * std::numbers::pi * i / count}));
-  return directions;
-}
-
-SampleSetInfo small_info(bool polarised = false) {
-  SampleSetInfo info;
-  info.width = 5;  // an odd number of texels, which no tensor may be upset by
-  info.height = 3;
-  info.polarised = polarised;
-  info.views = ring(6, 1.0);
-  info.lights = ring(7, 1.1);
-  info.source = "a formula";
-  return info;
-}
-
-double cosine(const SampleSetInfo& info, int light) {
-  return info.lights[static_cast<std::size_t>(light)].z();
-}
-double shine(const SampleSetInfo& info, int view, int light) {
-  const Direction half =
-      (info.views[static_cast<std::size_t>(view)] + info.lights[static_cast<std::size_t>(light)])
-          .normalized();
-  return std::pow(half.z(), 12.0) * cosine(info, light);
-}
-
-// Body colour times cosine plus light colour times a lobe: rank 1 in each term, two colours a
-// texel. Polarised sets have the two parts in separate channels.
-float dichromatic(const SampleSetInfo& info, int texel, int view, int light, int channel) {
-  constexpr std::array kLightColour{0.9, 0.8, 0.6};
-  const bool diffuse_part = channel >= 3;
-  const int c = channel % 3;
-  const double diffuse = (0.1 + 0.05 * texel * (c + 1) / 3.0) * cosine(info, light);
-  const double specular = 0.3 * (1 + texel % 3) / 3.0 * kLightColour[static_cast<std::size_t>(c)] *
-                          shine(info, view, light);
-  if (!info.polarised) return static_cast<float>(diffuse + specular);
-  return static_cast<float>(diffuse_part ? diffuse : specular);
-}
-
-SampleSet dichromatic_set(const fs::path& folder, bool polarised) {
-  const SampleSetInfo info = small_info(polarised);
-  return make_set(folder, info, [info](int texel, int view, int light, int channel) {
-    return dichromatic(info, texel, view, light, channel);
-  });
-}
-
-Result<std::unique_ptr<Material>> fit(std::string_view model,
-                                      const SampleSet& set,
-                                      const FitOptions& options) {
-  SilentProgress progress;
-  return (*find_model(model))->fit(set, options, progress);
-}
-
-FitOptions options_with(std::string components, int clusters = 2) {
-  FitOptions options;
-  options.components = std::move(components);
-  options.clusters = clusters;
-  options.angular = 12;
-  return options;
-}
-
-// The one that a model of one term takes, or of two.
-std::string components_of(const Model& model, const char* one, const char* two) {
-  return model.terms == 2 ? two : one;
-}
+using testing::ring;
+using testing::shine;
+using testing::small_info;
 
 bool has_form(const Model& model, std::string_view form) {
   return form.empty() || model.name == "dichromatic-lpca";
@@ -97,19 +36,6 @@ bool has_form(const Model& model, std::string_view form) {
 
 bool is_formula_of_view(const Model& model) {
   return model.name == "lafortune" || model.name == "scaled-lafortune" || model.name == "phong";
-}
-
-double largest_error(const SampleSet& set, const Material& material) {
-  std::vector<float> wanted(static_cast<std::size_t>(set.info().pair_count()) * 3);
-  std::vector<float> got(wanted.size());
-  double largest = 0.0;
-  for (int texel = 0; texel < set.info().texel_count(); ++texel) {
-    set.rgb(texel, Part::kTotal, wanted);
-    material.reconstruct(texel, got);
-    for (std::size_t i = 0; i < wanted.size(); ++i)
-      largest = std::max(largest, double(std::abs(wanted[i] - got[i])));
-  }
-  return largest;
 }
 
 TEST(Models, AreFoundByNameAndOthersAreRefusedWithTheList) {
@@ -477,101 +403,6 @@ TEST(Models, FitsAreTheSameForTheSameSeed) {
           std::ranges::equal((*a)->contents().tensors[i].bytes, (*b)->contents().tensors[i].bytes))
           << model.name << " " << (*a)->contents().tensors[i].spec.name;
   }
-}
-
-TEST(LoadMaterial, RefusesDamagedFilesWithAMessage) {
-  const TemporaryFolder folder;
-  const SampleSet set = dichromatic_set(folder.path() / "a.btfset", true);
-  const fs::path path = folder.path() / "a.safetensors";
-  for (const Model& model : models()) {
-    const auto material = fit(model.name, set, options_with(components_of(model, "2", "1+1")));
-    ASSERT_TRUE(material) << material.error().what;
-    const Material::Contents good = (*material)->contents();
-
-    // Writes the contents after a change, under the given version.
-    const auto load_changed = [&](const std::function<void(Material::Contents&)>& change) {
-      Material::Contents contents = good;
-      contents.metadata["format"] = "veneer-material";
-      contents.metadata["version"] = "1";
-      contents.metadata["model"] = model.name;
-      change(contents);
-      std::ranges::stable_sort(contents.tensors, std::greater{}, [](const auto& tensor) {
-        return size_of(tensor.spec.dtype);
-      });
-      std::vector<TensorSpec> specs;
-      for (const auto& tensor : contents.tensors) specs.push_back(tensor.spec);
-      auto writer = SafetensorsWriter::create(path, specs, contents.metadata);
-      EXPECT_TRUE(writer);
-      for (const auto& tensor : contents.tensors) {
-        const auto fill = [&]<class T>(std::span<T> target) {
-          std::memcpy(target.data(),
-                      tensor.bytes.data(),
-                      std::min(target.size_bytes(), tensor.bytes.size()));
-        };
-        if (tensor.spec.dtype == DType::kU8) fill(writer->tensor<std::uint8_t>(tensor.spec.name));
-        if (tensor.spec.dtype == DType::kF16) fill(writer->tensor<Eigen::half>(tensor.spec.name));
-        if (tensor.spec.dtype == DType::kF32) fill(writer->tensor<float>(tensor.spec.name));
-        if (tensor.spec.dtype == DType::kF64) fill(writer->tensor<double>(tensor.spec.name));
-      }
-      EXPECT_TRUE(writer->finish());
-      return load_material(path);
-    };
-    const auto expect_refused = [&](const std::string& what,
-                                    const std::function<void(Material::Contents&)>& change) {
-      const auto loaded = load_changed(change);
-      ASSERT_FALSE(loaded) << model.name << ": " << what;
-      EXPECT_EQ(loaded.error().code, Errc::kBadFormat) << loaded.error().what;
-      EXPECT_NE(loaded.error().what.find("a.safetensors"), std::string::npos)
-          << loaded.error().what;
-    };
-
-    ASSERT_TRUE(load_changed([](auto&) {}));
-    std::vector<std::string> keys{"format", "version", "model", "width"};
-    for (const char* key : {"components", "lobes", "fallback_texels"})
-      if (good.metadata.contains(key)) keys.emplace_back(key);
-    for (const std::string& key : keys) {
-      expect_refused(key, [key](auto& c) { c.metadata.erase(key); });
-      expect_refused(key, [key](auto& c) { c.metadata[key] = "-7"; });
-    }
-    for (const char* name : {"views", "lights"}) {
-      const auto tensor = std::ranges::find(
-          good.tensors, name, [](const auto& t) -> const std::string& { return t.spec.name; });
-      const auto index = static_cast<std::size_t>(tensor - good.tensors.begin());
-      std::vector<double> values(tensor->bytes.size() / sizeof(double));
-      std::memcpy(values.data(), tensor->bytes.data(), tensor->bytes.size());
-      const auto replace_second = [&](const Direction& direction) {
-        std::copy_n(direction.data(), 3, values.begin() + 3);
-        return [&values, index](auto& c) {
-          c.tensors[index].bytes = std::as_bytes(std::span(values));
-        };
-      };
-      expect_refused("equal directions", replace_second({values[0], values[1], values[2]}));
-      expect_refused("a direction from below", replace_second({0.6, 0.0, -0.8}));
-    }
-    if (good.metadata.contains("angular"))
-      expect_refused("too many nodes", [](auto& c) { c.metadata["angular"] = "64"; });
-    expect_refused("a newer version", [](auto& c) { c.metadata["version"] = "2"; });
-    for (std::size_t i = 0; i < good.tensors.size(); ++i) {
-      const TensorSpec& spec = good.tensors[i].spec;
-      expect_refused("without " + spec.name, [i](auto& c) {
-        c.tensors.erase(c.tensors.begin() + static_cast<std::ptrdiff_t>(i));
-      });
-      expect_refused("another shape of " + spec.name,
-                     [i](auto& c) { c.tensors[i].spec.shape.back() *= 2; });
-      // Any byte is a value of an image.
-      if (spec.name == "eigen_textures" && spec.dtype == DType::kU8) continue;
-      // All bits set: NaN, or a cluster that is not there.
-      const std::vector<std::byte> bad(good.tensors[i].bytes.size(), std::byte{0xFF});
-      expect_refused("bad values in " + spec.name, [&, i](auto& c) { c.tensors[i].bytes = bad; });
-    }
-  }
-  EXPECT_EQ(load_material(folder.path() / "none.safetensors").error().code, Errc::kNotFound);
-
-  ASSERT_TRUE(fit("lpca", set, options_with("2")).and_then([&](const auto& material) {
-    return save_material(*material, path, {}).map([] { return 0; });
-  }));
-  fs::resize_file(path, fs::file_size(path) / 2);
-  EXPECT_EQ(load_material(path).error().code, Errc::kBadFormat);
 }
 
 }  // namespace

@@ -19,17 +19,11 @@ namespace {
 namespace fs = std::filesystem;
 using testing::make_set;
 using testing::random_direction;
+using testing::ring;
 
 // Factors and weights in float16, for values up to 1.
 constexpr double kHalfTolerance = 4e-3;
 constexpr std::array kPrecisions{"8bit", "float16"};
-
-DirectionSet ring(int count, double theta) {
-  DirectionSet directions{Direction::UnitZ()};
-  for (int i = 0; i < count; ++i)
-    directions.push_back(direction_from_angles({theta, 2.0 * std::numbers::pi * i / count}));
-  return directions;
-}
 
 SampleSetInfo small_info() {
   SampleSetInfo info;
