@@ -247,8 +247,9 @@ TEST(RevisedLpca, DISABLED_PrintsItsVolume) {
   const TemporaryFolder folder;
   const auto material = fit(formula_set(folder.path() / "a.btfset", small_info()), "3", "");
   ASSERT_TRUE(material);
+  const ModelShader shader = (*material)->shader();
   std::uint64_t hash = 0;
-  for (const std::byte value : (*material)->shader().textures.back().data)
+  for (const std::byte value : shader.textures.back().data)
     hash = hash * 1099511628211U + static_cast<std::uint64_t>(value);
   std::cout << "result " << hash << std::endl;
 }
