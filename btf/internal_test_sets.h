@@ -2,12 +2,18 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <functional>
+#include <initializer_list>
+#include <memory>
 #include <numbers>
+#include <set>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include "base/random.h"
 #include "base/testing/temporary_folder.h"
@@ -53,6 +59,31 @@ inline SampleSet make_set(const std::filesystem::path& folder,
   auto set = SampleSet::open(folder);
   if (!set) throw std::runtime_error(set.error().what);
   return *set;
+}
+
+/// What a disabled test of this program prints behind "result ", run in a process of its own for
+/// each number of threads, which is settled when it is first asked for.
+inline std::set<std::string> results_on_threads(std::string_view test,
+                                                std::initializer_list<int> threads) {
+  const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
+  std::set<std::string> results;
+  for (const int count : threads) {
+    const std::string command = fmt::format(
+        "VENEER_THREADS={0} OPENBLAS_NUM_THREADS={0} '{1}' --gtest_also_run_disabled_tests "
+        "--gtest_filter={2}",
+        count,
+        program,
+        test);
+    const std::unique_ptr<FILE, int (*)(FILE*)> output(::popen(command.c_str(), "r"), &::pclose);
+    if (!output) throw std::runtime_error(command);
+    std::array<char, 256> line{};
+    std::string result;
+    while (std::fgets(line.data(), line.size(), output.get()) != nullptr)
+      if (std::string_view(line.data()).starts_with("result ")) result = line.data();
+    if (result.empty()) throw std::runtime_error("no result of " + command);
+    results.insert(result);
+  }
+  return results;
 }
 
 }  // namespace veneer::btf::testing

@@ -9,14 +9,11 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstdio>
-#include <filesystem>
 #include <iostream>
-#include <memory>
-#include <set>
 #include <string>
 
 #include "base/random.h"
+#include "btf/internal_test_sets.h"
 #include "btf/internal_thread_ranks.h"
 
 namespace veneer::btf {
@@ -165,24 +162,7 @@ TEST(LocalPca, DISABLED_PrintsItsResult) {
 }
 
 TEST(LocalPca, IsTheSameForAnyNumberOfThreads) {
-  const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
-  std::set<std::string> results;
-  for (const int threads : {1, 2, 3}) {
-    const std::string command = fmt::format(
-        "VENEER_THREADS={0} OPENBLAS_NUM_THREADS={0} '{1}' --gtest_also_run_disabled_tests "
-        "--gtest_filter=LocalPca.DISABLED_PrintsItsResult",
-        threads,
-        program);
-    const std::unique_ptr<FILE, int (*)(FILE*)> output(popen(command.c_str(), "r"), &pclose);
-    ASSERT_TRUE(output);
-    std::array<char, 256> line{};
-    std::string result;
-    while (std::fgets(line.data(), line.size(), output.get()) != nullptr)
-      if (std::string_view(line.data()).starts_with("result ")) result = line.data();
-    ASSERT_FALSE(result.empty()) << command;
-    results.insert(result);
-  }
-  EXPECT_EQ(results.size(), 1U);
+  EXPECT_EQ(testing::results_on_threads("LocalPca.DISABLED_PrintsItsResult", {1, 2, 3}).size(), 1U);
 }
 
 // The same rows, sums made in another order. Of each rank, so that all are seen to have everything.

@@ -6,9 +6,7 @@
 
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <iostream>
-#include <set>
 
 #include "btf/internal_test_sets.h"
 #include "btf/interpolated_set.h"
@@ -299,24 +297,8 @@ TEST(EigenTexture, DISABLED_PrintsItsImages) {
 }
 
 TEST(EigenTexture, DoesNotDependOnThreads) {
-  const std::string program = fs::read_symlink("/proc/self/exe").string();
-  std::set<std::string> results;
-  for (const int threads : {1, 3}) {
-    const std::string command = fmt::format(
-        "VENEER_THREADS={} '{}' --gtest_also_run_disabled_tests "
-        "--gtest_filter=EigenTexture.DISABLED_PrintsItsImages",
-        threads,
-        program);
-    const std::unique_ptr<FILE, int (*)(FILE*)> output(popen(command.c_str(), "r"), &pclose);
-    ASSERT_TRUE(output);
-    std::array<char, 256> line{};
-    std::string result;
-    while (std::fgets(line.data(), line.size(), output.get()) != nullptr)
-      if (std::string_view(line.data()).starts_with("result ")) result = line.data();
-    ASSERT_FALSE(result.empty()) << command;
-    results.insert(result);
-  }
-  EXPECT_EQ(results.size(), 1U);
+  EXPECT_EQ(testing::results_on_threads("EigenTexture.DISABLED_PrintsItsImages", {1, 3}).size(),
+            1U);
 }
 
 }  // namespace
