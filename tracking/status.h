@@ -29,7 +29,8 @@ struct TrackerCounters {
   std::uint64_t suspect = 0;        ///< marked as unsure by the device; dropped
   std::uint64_t skipped_bytes = 0;  ///< that belong to no frame
   std::uint64_t bad_frames = 0;     ///< of a wrong size, checksum, station or version
-  std::uint64_t clock_outliers = 0;  ///< samples whose device time does not fit their arrival; dropped
+  std::uint64_t clock_outliers =
+      0;  ///< samples whose device time does not fit their arrival; dropped
   std::uint64_t clock_restarts = 0;
   std::uint64_t io_errors = 0;
   std::uint64_t restarts = 0;     ///< told again what to send

@@ -50,8 +50,8 @@ struct ProtocolCounters {
 };
 
 /// What the bytes of a device mean. Pure: it does no input or output and asks for no time, so that
-/// it can be fuzzed, and any way to cut the same bytes into pieces gives the same samples (where the
-/// transport is a byte stream; reports and datagrams come whole).
+/// it can be fuzzed, and any way to cut the same bytes into pieces gives the same samples (where
+/// the transport is a byte stream; reports and datagrams come whole).
 class Protocol {
  public:
   virtual ~Protocol() = default;

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "tracking/device/protocol.h"
+#include "tracking/drivers/polhemus/polhemus_frame.h"
+
+namespace veneer::tracking {
+
+/// LIBERTY and PATRIOT, binary continuous output. Sensor n is station n, the frame of reference is
+/// that of the transmitter (x forward, y right, z down as it is shipped), positions come in
+/// centimetres and leave in metres. Ticks and sequence numbers both are the frame count.
+///
+/// There is no checksum. A frame counts when tag, station, command and size are right: six bytes
+/// that hardly ever stand so among others. When not, one byte is skipped, never more, so that no
+/// true frame is lost to a false one. What follows is not looked at, since it would have to be
+/// waited for. A run of readable text says that the device has reset itself and answers in ASCII.
+class PolhemusProtocol final : public Protocol {
+ public:
+  explicit PolhemusProtocol(PolhemusModel model) : model_(model) {}
+
+  [[nodiscard]] std::vector<Command> start() const override;
+  [[nodiscard]] std::optional<DeviceClock> clock() const override;
+  [[nodiscard]] std::optional<WrappingCounter> sequence() const override {
+    return WrappingCounter{32};
+  }
+  [[nodiscard]] Duration period() const override;
+  void reset() override;
+  void feed(std::span<const std::byte> bytes,
+            std::vector<RawSample>& samples,
+            std::vector<std::byte>& reply) override;
+  [[nodiscard]] bool wants_restart() const override { return answers_in_text_; }
+  [[nodiscard]] ProtocolCounters counters() const override { return counters_; }
+
+ private:
+  void skip_byte(std::byte byte);
+
+  PolhemusModel model_;
+  std::vector<std::byte> pending_;  // the beginning of a frame
+  int text_run_ = 0;                // readable bytes skipped in a row
+  bool answers_in_text_ = false;
+  ProtocolCounters counters_;
+};
+
+}  // namespace veneer::tracking
