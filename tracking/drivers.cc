@@ -7,6 +7,7 @@
 
 #include "tracking/drivers/replay/replay_tracker.h"
 #include "tracking/drivers/simulated/simulated_tracker.h"
+#include "tracking/drivers/simulated_device/simulated_device.h"
 
 namespace veneer::tracking {
 namespace {
@@ -19,6 +20,9 @@ Result<std::unique_ptr<Tracker>> open_as_tracker(TomlReader& config, Clock& cloc
 constexpr std::array kDrivers{
     Driver{"replay", "a recording, at its own pace", &open_as_tracker<ReplayTracker>},
     Driver{"simulated", "bodies on scripted paths", &open_as_tracker<SimulatedTracker>},
+    Driver{"simulated-device",
+           "the same behind a real protocol, with planned faults",
+           &open_simulated_device},
 };
 static_assert(std::ranges::is_sorted(kDrivers, {}, &Driver::name));
 

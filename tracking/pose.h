@@ -21,6 +21,9 @@ struct PoseSample {
   RigidTransform world_from_body;
   /// Grows by one with every sample that the device sent for this body; gaps are lost samples.
   std::uint64_t sequence = 0;
+  /// Samples of different epochs are not to be compared: in between the device's clock began anew,
+  /// or the body jumped.
+  std::uint32_t epoch = 0;
 };
 
 /// How a pose for a moment was found.

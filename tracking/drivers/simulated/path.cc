@@ -179,4 +179,23 @@ Result<Path::Motion> Path::read_waypoints(TomlReader& toml) {
   };
 }
 
+Result<std::vector<Path>> Path::read_all(TomlReader& toml) {
+  std::vector<Path> paths;
+  for (TomlReader& table : toml.tables("path")) {
+    VENEER_ASSIGN(Path path, Path::read(table));
+    if (std::ranges::find(paths, path.body(), &Path::body) != paths.end()) {
+      return fail(
+          Errc::kInvalidOption,
+          "opening the simulated tracker: body {} has two paths; give every path a body of its own",
+          path.body());
+    }
+    paths.push_back(std::move(path));
+  }
+  if (paths.empty()) {
+    return fail(Errc::kInvalidOption,
+                "opening the simulated tracker: there is no path; add a [[tracker.path]] table");
+  }
+  return paths;
+}
+
 }  // namespace veneer::tracking

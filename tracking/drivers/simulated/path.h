@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <utility>
+#include <vector>
 
 #include "base/result.h"
 #include "base/rigid_transform.h"
@@ -32,6 +33,9 @@ class Path {
   ///
   /// `height_m` is counted from the centre. Errors: kInvalidOption.
   [[nodiscard]] static Result<Path> read(TomlReader& toml);
+
+  /// Reads all [[path]] tables of `toml`: one or more, each body once. Errors: kInvalidOption.
+  [[nodiscard]] static Result<std::vector<Path>> read_all(TomlReader& toml);
 
   [[nodiscard]] BodyId body() const { return body_; }
   /// The true world_from_body at `seconds` after the path's time zero; any finite time.

@@ -12,6 +12,7 @@
 #include "base/result.h"
 #include "base/toml_reader.h"
 #include "tracking/drivers/simulated/path.h"
+#include "tracking/drivers/simulated/pose_noise.h"
 #include "tracking/tracker.h"
 
 namespace veneer::tracking {
@@ -20,10 +21,7 @@ namespace veneer::tracking {
 struct SimulatedTrackerOptions {
   /// Samples a second of every body. 1 to 10000.
   double rate_hz = 240;
-  /// Standard deviation of every coordinate. 0 to 1000.
-  double noise_position_mm = 0;
-  /// Standard deviation of every component of the rotation vector. 0 to 90.
-  double noise_rotation_deg = 0;
+  PoseNoise noise{};
   /// Seeds the noise.
   std::uint64_t seed = 1;
   /// From the moment of measurement to the arrival of the sample. 0 to 1000.
@@ -54,7 +52,6 @@ class SimulatedTracker final : public Tracker {
 
  private:
   SimulatedTracker(const SimulatedTrackerOptions& options, std::vector<Path> paths, Clock& clock);
-  [[nodiscard]] RigidTransform add_noise(const RigidTransform& truth, Pcg32& random) const;
 
   SimulatedTrackerOptions options_;
   std::vector<Path> paths_;
