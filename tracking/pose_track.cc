@@ -23,6 +23,7 @@ constexpr double kNothingLeft = 0.05;
 /// A query starts again when the writer has gone over the whole ring in the middle of it, which
 /// takes it 1024 samples; it does so at most this often.
 constexpr int kAttempts = 4;
+constexpr std::size_t kNumbers = 7;  // of a pose
 
 /// later - earlier in seconds, for any two times.
 double seconds_between(Time earlier, Time later) {
@@ -128,7 +129,7 @@ PoseTrack::Verdict PoseTrack::add(const PoseSample& sample) {
   rotation.coeffs() /= length;
   if (!first && rotation.dot(newest_.world_from_body.rotation) < 0) rotation.coeffs() *= -1;
   newest_ = taken;
-  publish({taken.time, taken.world_from_body});
+  publish({taken.time, taken.world_from_body, taken.epoch});
   return Verdict::kTaken;
 }
 
@@ -141,7 +142,7 @@ void PoseTrack::publish(const TimedPose& pose) {
   const std::uint64_t index = published_.load(std::memory_order_relaxed);
   const Eigen::Vector3d& p = pose.world_from_body.translation;
   const Eigen::Quaterniond& q = pose.world_from_body.rotation;
-  const std::array<double, kWords - 1> numbers{p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z()};
+  const std::array<double, kNumbers> numbers{p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z()};
 
   Slot& slot = slots_[index % kSlots];
   slot.stamp.store(2 * index + 1, std::memory_order_relaxed);
@@ -150,6 +151,7 @@ void PoseTrack::publish(const TimedPose& pose) {
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     slot.words[i + 1].store(std::bit_cast<std::uint64_t>(numbers[i]), std::memory_order_release);
   }
+  slot.words[kNumbers + 1].store(pose.epoch, std::memory_order_release);
   slot.stamp.store(2 * index + 2, std::memory_order_release);
   published_.store(index + 1, std::memory_order_release);
 }
@@ -159,13 +161,16 @@ std::optional<PoseTrack::TimedPose> PoseTrack::read(std::uint64_t index) const {
   const std::uint64_t complete = 2 * index + 2;
   if (slot.stamp.load(std::memory_order_acquire) != complete) return std::nullopt;
   const auto ticks = static_cast<Duration::rep>(slot.words[0].load(std::memory_order_acquire));
-  std::array<double, kWords - 1> n{};
+  std::array<double, kNumbers> n{};
   for (std::size_t i = 0; i < n.size(); ++i) {
     n[i] = std::bit_cast<double>(slot.words[i + 1].load(std::memory_order_acquire));
   }
+  const auto epoch =
+      static_cast<std::uint32_t>(slot.words[kNumbers + 1].load(std::memory_order_acquire));
   if (slot.stamp.load(std::memory_order_relaxed) != complete) return std::nullopt;
   return TimedPose{Time{Duration{ticks}},
-                   {Eigen::Quaterniond(n[3], n[4], n[5], n[6]), Eigen::Vector3d(n[0], n[1], n[2])}};
+                   {Eigen::Quaterniond(n[3], n[4], n[5], n[6]), Eigen::Vector3d(n[0], n[1], n[2])},
+                   epoch};
 }
 
 PoseEstimate PoseTrack::at(Time when) const {
@@ -190,6 +195,10 @@ PoseEstimate PoseTrack::interpolate(Time when, const TimedPose& newest, std::uin
     if (when < earlier->time) {
       later = *earlier;
       continue;
+    }
+    if (earlier->epoch != later.epoch) {
+      later = *earlier;
+      break;
     }
     const double span_s = seconds_between(earlier->time, later.time);
     const double part = seconds_between(earlier->time, when) / span_s;
@@ -247,7 +256,7 @@ PoseTrack::Rates PoseTrack::fit_rates(const TimedPose& newest, std::uint64_t ind
   Eigen::Quaterniond later = newest.world_from_body.rotation;
   for (std::uint64_t back = 1; back <= std::min<std::uint64_t>(index, kSlots - 1); ++back) {
     const std::optional<TimedPose> sample = read(index - back);
-    if (!sample) break;
+    if (!sample || sample->epoch != newest.epoch) break;
     const double ago_s = seconds_between(sample->time, newest.time);
     const bool second_of_slow_tracker = span_s < kShortestSpan_s && ago_s <= kLongestGap_s;
     if (ago_s > options_.velocity_window_s && !second_of_slow_tracker) break;

@@ -48,14 +48,17 @@ class PoseTrack {
   /// Velocities are those of the straight line of least squares through the samples of the velocity
   /// window, but through at least two samples where the second is at most 0.2 s older; zero where
   /// there is but one sample or they span less than 0.5 ms. The 1024 newest samples are kept: all
-  /// of any window up to 10 kHz; of a faster tracker the window is what these span. Position and
-  /// rotation are continuous in `when`. Never NaN. No allocation, no lock, no system call.
+  /// of any window up to 10 kHz; of a faster tracker the window is what these span. Velocities and
+  /// interpolation never reach from one epoch into another: up to the first sample of the later
+  /// epoch the last pose of the earlier one is held. Within an epoch position and rotation are
+  /// continuous in `when`. Never NaN. No allocation, no lock, no system call.
   [[nodiscard]] PoseEstimate at(Time when) const;
 
  private:
   struct TimedPose {
     Time time;
     RigidTransform world_from_body;
+    std::uint32_t epoch = 0;
   };
   struct Rates {
     Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
@@ -64,7 +67,7 @@ class PoseTrack {
   /// 4.3 s at 240 Hz, 0.102 s at the 10 kHz of the fastest simulated tracker: longer than any
   /// velocity window.
   static constexpr std::size_t kSlots = 1024;
-  static constexpr std::size_t kWords = 8;  // time, position, quaternion
+  static constexpr std::size_t kWords = 9;  // time, position, quaternion, epoch
   struct Slot {
     /// 2 n + 1 while sample n is being written, 2 n + 2 once it is there.
     std::atomic<std::uint64_t> stamp{0};

@@ -453,5 +453,26 @@ TEST(PoseTrack, HandsOverWholePosesBetweenThreads) {
   EXPECT_GT(asked, 100);
 }
 
+TEST(PoseTrack, NothingReachesFromOneEpochIntoAnother) {
+  using std::chrono::milliseconds;
+  PoseTrack track{{}};
+  for (int i = 0; i < 20; ++i) {
+    PoseSample sample;
+    sample.sequence = static_cast<std::uint64_t>(i);
+    sample.time = Time{milliseconds(10 * i)};
+    // 1 m/s, a jump of 3 m in the middle, 1 m/s again.
+    sample.world_from_body.translation = {0.01 * i + (i < 10 ? 0 : 3), 0, 0};
+    sample.epoch = i < 10 ? 4 : 5;
+    ASSERT_EQ(track.add(sample), PoseTrack::Verdict::kTaken);
+    const PoseEstimate ahead = track.at(sample.time + milliseconds(10));
+    const bool first_of_epoch = i == 0 || i == 10;
+    EXPECT_NEAR(ahead.velocity.x(), first_of_epoch ? 0 : 1, 1e-9) << i;
+  }
+  const PoseEstimate between = track.at(Time{milliseconds(95)});
+  EXPECT_EQ(between.origin, PoseOrigin::kHeld);
+  EXPECT_NEAR(between.world_from_body.translation.x(), 0.09, 1e-12);
+  EXPECT_EQ(track.at(Time{milliseconds(105)}).origin, PoseOrigin::kInterpolated);
+}
+
 }  // namespace
 }  // namespace veneer::tracking
