@@ -71,6 +71,16 @@ class Material {
   [[nodiscard]] virtual Eigen::Vector3d radiance(int texel,
                                                  const Direction& view,
                                                  const Direction& light) const = 0;
+  /// Whether the model draws a specular term of its own, which SPECULAR_WEIGHT multiplies in its
+  /// shader (model_shader.h). Models of the whole reflectance have none to take away.
+  [[nodiscard]] virtual bool has_specular_term() const { return false; }
+  /// What is left of radiance() without that term, negative results cut to 0; all of it where there
+  /// is none. Between them the shader is linear in the weight, before the cut.
+  [[nodiscard]] virtual Eigen::Vector3d diffuse_radiance(int texel,
+                                                         const Direction& view,
+                                                         const Direction& light) const {
+    return radiance(texel, view, light);
+  }
   [[nodiscard]] virtual ModelShader shader() const = 0;
   /// Numbers kept for one texel, whatever their precision, with a texel's share of what clusters
   /// have in common; what a whole set shares is not counted (Meseth et al. 2003, Table 2).

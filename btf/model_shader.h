@@ -66,6 +66,11 @@ struct EigenCache {
 /// `vec3 btf_radiance(vec2 uv, vec3 view, vec3 light)` in the sample's unit, and its textures.
 /// `uv` is in repeats of the sample (uv.x = 1 is one width to the right), `view` and `light` are
 /// unit vectors in the local frame; view.z may be slightly below 0 at silhouettes.
+///
+/// Who draws may define SPECULAR_WEIGHT before the source, an expression in 0 to 1. A model whose
+/// specular part is a term of its own (Material::has_specular_term()) multiplies it by that, in
+/// btf_radiance() and btf_radiance_cached(), and puts models/specular_weight.glsl first, which
+/// makes it 1 where nobody says. Other models do not read it.
 struct ModelShader {
   std::string source;  ///< constants first, no #version
   std::vector<ModelTexture> textures;

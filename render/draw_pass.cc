@@ -36,7 +36,9 @@ struct FrameBlock {
   Eigen::Matrix4f xyz_from_rgb;
   Eigen::Vector4f eye;
   Eigen::Vector4f projector;
-  Eigen::Vector4f texture_repeats;
+  Eigen::Vector2f texture_repeats;
+  float specular_weight;
+  float unused;
   std::array<Eigen::Vector4f, 2 * kMaxLights> lights;  // lights[n], then light_rgb[n]
 };
 static_assert(offsetof(FrameBlock, lights) == 2 * 64 + 3 * 16);
@@ -174,8 +176,9 @@ void DrawPass::draw(GLuint framebuffer, const MeshBuffers& mesh, const DrawInput
   block.eye = homogeneous(object_from_world * input.eye_in_world, 1.0);
   block.projector = homogeneous(object_from_world * projector_in_world_,
                                 reference_distance_m_ * reference_distance_m_);
-  block.texture_repeats =
-      Eigen::Vector4d(texture_repeats_.x(), texture_repeats_.y(), 0, 0).cast<float>();
+  block.texture_repeats = texture_repeats_.cast<float>();
+  block.specular_weight = static_cast<float>(input.specular_weight);
+  block.unused = 0.0F;
   for (std::size_t i = 0; i < lights_.size(); ++i) {
     const LightUniform light = uniform_of(lights_[i], object_from_world);
     block.lights[i] = light.light;

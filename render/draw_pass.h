@@ -49,6 +49,7 @@ inline constexpr double kNearPlane = 0.01;  // metres
 struct DrawInput {
   Eigen::Vector3d eye_in_world;
   RigidTransform world_from_object;
+  double specular_weight = 1.0;  ///< as FrameInput's
 };
 
 /// Draws a mesh in a material, as the projector sees it, into an RGBA16F target with depth: XYZ in

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <string>
@@ -212,6 +213,8 @@ Result<std::vector<Vector4f>> draw(const btf::ModelShader& shader, const std::ve
 //   the pole, where it takes a root of 1 - z: that, times 8 nodes, is 2e-3 of neighbours'
 //   difference.
 constexpr double kLargestDifference = 1.3 * 8e-3;
+// Sums of numbers up to 2 in float, in one order or another.
+constexpr float kFloatSums = 1e-5F;
 // On average they cancel: a wrong formula does not.
 constexpr double kMeanDifference = 1.3 * 4e-4;
 
@@ -244,6 +247,51 @@ TEST(ModelShaders, DrawWhatTheEvaluationSays) {
   }
 }
 
+// Weight 1 is what everything else tests; 0 leaves the diffuse part; between them the shader is
+// linear, except where it cuts negative sums to 0.
+TEST(ModelShaders, FadeTheirSpecularTerm) {
+  const auto context = EglContext::create();
+  if (!context) GTEST_SKIP() << context.error().what;
+  const std::vector<Query> all = queries(kColumns * kRows);
+  int with_term = 0;
+  for (const Fitted& fit : fitted()) {
+    SCOPED_TRACE(fit.name);
+    btf::ModelShader shader = fit.material->shader();
+    const auto draw_at = [&](double weight) {
+      btf::ModelShader weighted = shader;
+      weighted.source = fmt::format("#define SPECULAR_WEIGHT {:.9f}\n", weight) + shader.source;
+      auto drawn = draw(weighted, all);
+      EXPECT_TRUE(drawn) << drawn.error().what;
+      return drawn ? *drawn : std::vector<Vector4f>(all.size());
+    };
+    const std::vector<Vector4f> none = draw_at(0.0);
+    const std::vector<Vector4f> half = draw_at(0.5);
+    const std::vector<Vector4f> whole = draw_at(1.0);
+    double faded = 0;
+    double off_diffuse = 0;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const Vector3d diffuse =
+          fit.material->diffuse_radiance(all[i].texel, all[i].view, all[i].light);
+      const double off = (diffuse - none[i].head<3>().cast<double>()).cwiseAbs().maxCoeff();
+      ASSERT_LE(off, kLargestDifference) << all[i].view.transpose();
+      off_diffuse += off;
+      faded += double((whole[i] - none[i]).cwiseAbs().maxCoeff());
+      for (int c = 0; c < 3; ++c) {
+        if (!(none[i][c] > 0.0F && whole[i][c] > 0.0F)) continue;
+        ASSERT_NEAR(half[i][c], (none[i][c] + whole[i][c]) / 2, kFloatSums);
+      }
+    }
+    EXPECT_LE(off_diffuse / static_cast<double>(all.size()), kMeanDifference);
+    if (fit.material->has_specular_term()) {
+      ++with_term;
+      EXPECT_GT(faded / static_cast<double>(all.size()), 10 * kMeanDifference);
+    } else {
+      EXPECT_EQ(faded, 0.0);
+    }
+  }
+  EXPECT_GE(with_term, 5);
+}
+
 // What the angular cache draws of a model is what its shader draws, to the interpolation between
 // nodes that stand closer than the measured directions: on average the difference is small beside
 // the sample's 0.2 to 1.3, while a wrong cluster or component would show everywhere.
@@ -266,6 +314,7 @@ TEST(ModelShaders, CachedDrawsFollowThePerPixelDraw) {
       PointLight{{0.3, -0.2, 0.6}, Vector3d(0.5, 0.9, 1.2)}};
   DrawInput input;
   input.eye_in_world = {-0.3, 0.2, 0.9};
+  constexpr std::array kWeights{1.0, 0.25};
   int tested = 0;
   for (const Fitted& fit : fitted()) {
     const btf::ModelShader shader = fit.material->shader();
@@ -277,29 +326,36 @@ TEST(ModelShaders, CachedDrawsFollowThePerPixelDraw) {
          {AngularCacheOptions{}, AngularCacheOptions{.spacing = 4, .most_turn = 0.2}}) {
       const auto pass = DrawPass::create(shader, lights, {5, 5}, profile, {.cache = cache});
       ASSERT_TRUE(pass) << pass.error().what;
-      pass->draw(framebuffer.id(), mesh, input);
-      glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer.id());
-      glReadPixels(
-          0, 0, kWidth, kHeight, GL_RGBA, GL_FLOAT, drawn.emplace_back(kWidth * kHeight).data());
+      for (const double weight : kWeights) {
+        input.specular_weight = weight;
+        pass->draw(framebuffer.id(), mesh, input);
+        glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer.id());
+        glReadPixels(
+            0, 0, kWidth, kHeight, GL_RGBA, GL_FLOAT, drawn.emplace_back(kWidth * kHeight).data());
+      }
       if (cache.spacing > 0) {
         ASSERT_NE(pass->cache(), nullptr);
         EXPECT_GT(mesh.served(), 0.01);
       }
     }
-    double sum = 0;
-    double brightness = 0;
-    int covered = 0;
-    for (std::size_t i = 0; i < drawn[0].size(); ++i) {
-      ASSERT_EQ(drawn[0][i][3], drawn[1][i][3]);
-      if (!(drawn[0][i][3] > 0.0F)) continue;
-      ++covered;
-      sum += double((drawn[0][i] - drawn[1][i]).head<3>().cwiseAbs().maxCoeff());
-      brightness += double(drawn[0][i].head<3>().maxCoeff());
+    for (std::size_t w = 0; w < kWeights.size(); ++w) {
+      const std::vector<Vector4f>& alone = drawn[w];
+      const std::vector<Vector4f>& cached = drawn[kWeights.size() + w];
+      double sum = 0;
+      double brightness = 0;
+      int covered = 0;
+      for (std::size_t i = 0; i < alone.size(); ++i) {
+        ASSERT_EQ(alone[i][3], cached[i][3]);
+        if (!(alone[i][3] > 0.0F)) continue;
+        ++covered;
+        sum += double((alone[i] - cached[i]).head<3>().cwiseAbs().maxCoeff());
+        brightness += double(alone[i].head<3>().maxCoeff());
+      }
+      ASSERT_GT(covered, 1000);
+      EXPECT_GT(brightness / covered, 0.1);
+      EXPECT_LT(sum / covered, kMeanCacheDifference) << "specular weight " << kWeights[w];
+      EXPECT_GT(sum, 0.0) << "the cache was not used";
     }
-    ASSERT_GT(covered, 1000);
-    EXPECT_GT(brightness / covered, 0.1);
-    EXPECT_LT(sum / covered, kMeanCacheDifference);
-    EXPECT_GT(sum, 0.0) << "the cache was not used";
     if (has_glslang()) {
       EXPECT_EQ(glslang_complaints(draw_cached_fragment_source(shader, 2, 16), "frag"), "");
       EXPECT_EQ(glslang_complaints(cache_values_compute_source(shader), "comp"), "");

@@ -88,9 +88,12 @@ class GlRenderer final : public Renderer {
   ~GlRenderer() override { context_.make_current(); }
 
   void draw(const FrameInput& input) override {
+    VENEER_CHECK(input.specular_weight >= 0.0 && input.specular_weight <= 1.0);
     context_.make_current();
     timer_.begin();
-    draw_.draw(target_framebuffer_.id(), mesh_, {input.eye_in_world, input.world_from_object});
+    draw_.draw(target_framebuffer_.id(),
+               mesh_,
+               {input.eye_in_world, input.world_from_object, input.specular_weight});
     compensate_.run(target_.id(), input.dither_seed);
     timer_.end();
     glFlush();

@@ -36,6 +36,10 @@ struct FrameInput {
   Eigen::Vector3d eye_in_world;
   RigidTransform world_from_object;
   std::uint32_t dither_seed = 0;
+  /// The share of the material's highlights that is shown, 0 to 1; at 0 only its diffuse part is
+  /// left. Highlights tell a wrong eye at once, so they can go while nobody knows where it is.
+  /// Does nothing to materials without Material::has_specular_term().
+  double specular_weight = 1.0;
 };
 
 /// What one frame did, read without waiting for the GPU (so it may be of an earlier frame).

@@ -206,6 +206,31 @@ TEST_F(RendererTest, ShowsTheFirstTexelAtTheUpperLeft) {
   });
 }
 
+// The weight reaches a material's shader, drawn per pixel or as the mean of texels.
+TEST_F(RendererTest, FadesTheSpecularTerm) {
+  const ShaderMaterial shiny("return vec3(0.2, 0.3, 0.1) + SPECULAR_WEIGHT * vec3(0.4);");
+  for (const bool average : {false, true}) {
+    const auto renderer = make(plate_scene(), shiny, {.average_texels = average});
+    for (const double weight : {1.0, 0.25, 0.0}) {
+      FrameInput input{{0, 0, 1}, {}, 0};
+      EXPECT_EQ(input.specular_weight, 1.0);
+      input.specular_weight = weight;
+      renderer->draw(input);
+      Image<Rgb32f> target(kWidth, kHeight);
+      renderer->read_target(target.view());
+      int covered = 0;
+      for (const Rgb32f& pixel : target.pixels()) {
+        if (pixel.norm() == 0) continue;
+        const Vector3d shown = srgb_from_xyz() * pixel.cast<double>();
+        const Vector3d wanted = Vector3d(0.2, 0.3, 0.1) + Vector3d::Constant(0.4 * weight);
+        ASSERT_LT((shown - wanted).norm(), kHalfFloatTolerance);
+        ++covered;
+      }
+      EXPECT_GT(covered, 500);
+    }
+  }
+}
+
 // A checkerboard of black and white texels, each a little larger than a pixel.
 TEST_F(RendererTest, AveragesTheTexelsUnderAPixel) {
   const ShaderMaterial checker(

@@ -57,5 +57,6 @@ set(VENEER_MODEL_SHADERS
   models/phong/phong.glsl
   models/reflectance_field/reflectance_field.glsl
   models/scaled_lafortune/scaled_lafortune.glsl
+  models/specular_weight.glsl
   models/texel_at.glsl
   models/texel_colours/texel_colours.glsl)

@@ -17,6 +17,6 @@ void main() {
   surface.position = position;
   surface.normal = normal;
   surface.tangent = tangent;
-  surface.uv = texture_coordinate * frame.texture_repeats.xy;
+  surface.uv = texture_coordinate * frame.texture_repeats;
   gl_Position = frame.clip_from_object * vec4(position, 1.0);
 }

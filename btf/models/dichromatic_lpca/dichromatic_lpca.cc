@@ -24,6 +24,9 @@ constexpr float kNoise = 1e-3F;
 // Keeps the fade defined for lights measured down to the horizon.
 constexpr double kLeastCosine = 1e-6;
 
+constexpr char kSpecularWeightGlsl[] =
+#include "btf/models/specular_weight.glsl.inc"
+    ;
 constexpr char kGlsl[] =
 #include "btf/models/dichromatic_lpca/dichromatic_lpca.glsl.inc"
     ;
@@ -125,8 +128,16 @@ class Dichromatic final : public Material {
                            const Direction& view,
                            const Direction& light) const override {
     if (!(light.z() > 0.0)) return Eigen::Vector3d::Zero();
-    const double fade = terms_.subtractive ? std::min(1.0, light.z() / border_cosine_) : 1.0;
-    return (fade * combine(texel, scalars_.evaluate(texel, view, light))).cwiseMax(0.0);
+    return drawn(texel, scalars_.evaluate(texel, view, light), light);
+  }
+
+  bool has_specular_term() const override { return true; }
+
+  Eigen::Vector3d diffuse_radiance(int texel,
+                                   const Direction& view,
+                                   const Direction& light) const override {
+    if (!(light.z() > 0.0)) return Eigen::Vector3d::Zero();
+    return drawn(texel, {scalars_.evaluate(texel, view, light)[0], 0.0}, light);
   }
 
   ModelShader shader() const override {
@@ -141,6 +152,7 @@ class Dichromatic final : public Material {
         border_cosine_,
         vec3(terms_.specular_colour),
         vec3(terms_.shade_colour));
+    shader.source += kSpecularWeightGlsl;
     shader.source += kGlsl;
     if (terms_.subtractive) shader.cache.reset();
     return shader;
@@ -169,6 +181,11 @@ class Dichromatic final : public Material {
     if (terms_.subtractive)
       return colour - scalars[0] * terms_.shade_colour.cast<double>() + specular;
     return scalars[0] * colour + specular;
+  }
+
+  Eigen::Vector3d drawn(int texel, const Eigen::Vector2d& scalars, const Direction& light) const {
+    const double fade = terms_.subtractive ? std::min(1.0, light.z() / border_cosine_) : 1.0;
+    return (fade * combine(texel, scalars)).cwiseMax(0.0);
   }
 
   PackedLpca scalars_;

@@ -2,7 +2,7 @@ vec3 btf_radiance(vec2 uv, vec3 view, vec3 light) {
   vec2 scalars;
   vec3 colours[1];
   packed_evaluate(uv, view, light, scalars, colours);
-  vec3 specular = scalars.y * kSpecularColour;
+  vec3 specular = SPECULAR_WEIGHT * scalars.y * kSpecularColour;
   vec3 sum = kSubtractive
                  ? min(1.0, light.z / kBorderCosine) *
                        (colours[0] - scalars.x * kShadeColour + specular)
@@ -16,6 +16,6 @@ vec3 btf_radiance_cached(vec2 uv) {
   vec2 scalars;
   vec3 colours[1];
   packed_cached(uv, scalars, colours);
-  return max(scalars.x * colours[0] + scalars.y * kSpecularColour, 0.0);
+  return max(scalars.x * colours[0] + SPECULAR_WEIGHT * scalars.y * kSpecularColour, 0.0);
 }
 #endif

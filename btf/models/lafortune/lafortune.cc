@@ -11,6 +11,9 @@ namespace {
 
 constexpr std::string_view kName = "lafortune";
 
+constexpr char kSpecularWeightGlsl[] =
+#include "btf/models/specular_weight.glsl.inc"
+    ;
 constexpr char kTexelAtGlsl[] =
 #include "btf/models/texel_at.glsl.inc"
     ;
@@ -50,13 +53,23 @@ class Lafortune final : public Material {
     return lobes_.evaluate(texel, {view.x(), view.y(), std::max(view.z(), 0.0)}, light);
   }
 
+  bool has_specular_term() const override { return true; }
+
+  Eigen::Vector3d diffuse_radiance(int texel,
+                                   const Direction& /*view*/,
+                                   const Direction& light) const override {
+    if (!(light.z() > 0.0)) return Eigen::Vector3d::Zero();
+    return lobes_.evaluate_diffuse(texel, light);
+  }
+
   ModelShader shader() const override {
     ModelShader shader;
     shader.source = fmt::format("const ivec2 kTexels = ivec2({}, {});\nconst int kLobes = {};\n",
                                 frame_.width,
                                 frame_.height,
                                 lobes_.lobes);
-    for (const char* part : {kTexelAtGlsl, kLobesGlsl, kLafortuneLobesGlsl, kGlsl})
+    for (const char* part :
+         {kSpecularWeightGlsl, kTexelAtGlsl, kLobesGlsl, kLafortuneLobesGlsl, kGlsl})
       shader.source += part;
     shader.textures.push_back(lobes_.texture(frame_));
     shader.fetches = lobes_.layers();

@@ -210,6 +210,10 @@ Eigen::Vector3d LafortuneLobes::evaluate(int texel,
   return light.z() * (colour_at(diffuse, at) + sum * colour_at(specular, at));
 }
 
+Eigen::Vector3d LafortuneLobes::evaluate_diffuse(int texel, const Direction& light) const {
+  return light.z() * colour_at(diffuse, static_cast<std::size_t>(texel));
+}
+
 ModelTexture LafortuneLobes::texture(const MaterialFrame& frame) const {
   LayerWriter writer(frame.texel_count(), layers());
   for (int texel = 0; texel < frame.texel_count(); ++texel) {

@@ -7,5 +7,5 @@ vec3 lafortune(ivec2 texel, vec3 view, vec3 light) {
   for (int i = 0; i < kLobes; ++i)
     sum += lobe(texelFetch(Lobes, ivec3(texel, 2 + i), 0), view * light);
   return light.z * (texelFetch(Lobes, ivec3(texel, 0), 0).rgb +
-                    sum * texelFetch(Lobes, ivec3(texel, 1), 0).rgb);
+                    SPECULAR_WEIGHT * sum * texelFetch(Lobes, ivec3(texel, 1), 0).rgb);
 }

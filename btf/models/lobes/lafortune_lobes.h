@@ -92,6 +92,8 @@ struct LafortuneLobes {
   [[nodiscard]] Eigen::Vector3d evaluate(int texel,
                                          const Direction& view,
                                          const Direction& light) const;
+  /// The same without its lobes.
+  [[nodiscard]] Eigen::Vector3d evaluate_diffuse(int texel, const Direction& light) const;
   /// Layers: the diffuse colour, the specular one, a lobe each.
   [[nodiscard]] int layers() const { return 2 + lobes; }
   [[nodiscard]] ModelTexture texture(const MaterialFrame& frame) const;

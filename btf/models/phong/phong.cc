@@ -17,6 +17,9 @@ constexpr std::string_view kName = "phong";
 constexpr int kLayers = 2;
 constexpr std::size_t kValues = 5;  // diffuse R, G, B, strength, exponent
 
+constexpr char kSpecularWeightGlsl[] =
+#include "btf/models/specular_weight.glsl.inc"
+    ;
 constexpr char kTexelAtGlsl[] =
 #include "btf/models/texel_at.glsl.inc"
     ;
@@ -176,11 +179,20 @@ class Phong final : public Material {
     return evaluate(texel, {view.x(), view.y(), std::max(view.z(), 0.0)}, light);
   }
 
+  bool has_specular_term() const override { return true; }
+
+  Eigen::Vector3d diffuse_radiance(int texel,
+                                   const Direction& /*view*/,
+                                   const Direction& light) const override {
+    return std::max(0.0, light.z()) * colour_at(of(texel), 0);
+  }
+
   ModelShader shader() const override {
     ModelShader shader;
     shader.source =
         fmt::format("const ivec2 kTexels = ivec2({}, {});\n", frame_.width, frame_.height);
-    for (const char* part : {kTexelAtGlsl, kLobesGlsl, kGlsl}) shader.source += part;
+    for (const char* part : {kSpecularWeightGlsl, kTexelAtGlsl, kLobesGlsl, kGlsl})
+      shader.source += part;
     LayerWriter writer(frame_.texel_count(), kLayers);
     for (int texel = 0; texel < frame_.texel_count(); ++texel) {
       writer.put(0, texel, of(texel).first(4));

@@ -23,6 +23,9 @@ constexpr char kElevatedConcentricGlsl[] =
 constexpr char kDirectionLookupGlsl[] =
 #include "btf/models/direction_lookup.glsl.inc"
     ;
+constexpr char kSpecularWeightGlsl[] =
+#include "btf/models/specular_weight.glsl.inc"
+    ;
 constexpr char kTexelAtGlsl[] =
 #include "btf/models/texel_at.glsl.inc"
     ;
@@ -186,14 +189,26 @@ class ReflectanceField final : public Material {
     return light.z() * sum;
   }
 
+  bool has_specular_term() const override { return true; }
+
+  Eigen::Vector3d diffuse_radiance(int texel,
+                                   const Direction& /*view*/,
+                                   const Direction& light) const override {
+    return std::max(0.0, light.z()) * diffuse(texel);
+  }
+
   ModelShader shader() const override {
     ModelShader shader;
     shader.source = fmt::format("const ivec2 kTexels = ivec2({}, {});\nconst int kLobes = {};\n",
                                 frame_.width,
                                 frame_.height,
                                 fields_.lobes);
-    for (const char* part :
-         {kElevatedConcentricGlsl, kDirectionLookupGlsl, kTexelAtGlsl, kLobesGlsl, kGlsl})
+    for (const char* part : {kElevatedConcentricGlsl,
+                             kDirectionLookupGlsl,
+                             kSpecularWeightGlsl,
+                             kTexelAtGlsl,
+                             kLobesGlsl,
+                             kGlsl})
       shader.source += part;
     LayerWriter writer(frame_.texel_count(), layers_of(frame_, fields_.lobes));
     for (int texel = 0; texel < frame_.texel_count(); ++texel) {

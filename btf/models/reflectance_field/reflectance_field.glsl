@@ -13,7 +13,7 @@ vec3 btf_radiance(vec2 uv, vec3 view, vec3 light) {
     float lobes = 0.0;
     for (int j = 1; j <= kLobes; ++j)
       lobes += lobe(texelFetch(Fields, ivec3(texel, layer + j), 0), light);
-    sum += v.weight[i] * lobes * texelFetch(Fields, ivec3(texel, layer), 0).rgb;
+    sum += SPECULAR_WEIGHT * v.weight[i] * lobes * texelFetch(Fields, ivec3(texel, layer), 0).rgb;
   }
   return light.z > 0.0 ? light.z * sum : vec3(0.0);
 }

@@ -20,6 +20,9 @@ constexpr char kElevatedConcentricGlsl[] =
 constexpr char kDirectionLookupGlsl[] =
 #include "btf/models/direction_lookup.glsl.inc"
     ;
+constexpr char kSpecularWeightGlsl[] =
+#include "btf/models/specular_weight.glsl.inc"
+    ;
 constexpr char kTexelAtGlsl[] =
 #include "btf/models/texel_at.glsl.inc"
     ;
@@ -117,11 +120,17 @@ class ScaledLafortune final : public Material {
                            const Direction& light) const override {
     if (!(light.z() > 0.0)) return Eigen::Vector3d::Zero();
     const Direction above(view.x(), view.y(), std::max(view.z(), 0.0));
-    const DirectionWeights v = views_.weights(above);
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (std::size_t i = 0; i < 3; ++i)
-      sum += v.weight[i] * factor(texel, static_cast<std::size_t>(v.index[i]));
-    return sum.cwiseProduct(lobes_.evaluate(texel, above, light));
+    return factor_towards(texel, above).cwiseProduct(lobes_.evaluate(texel, above, light));
+  }
+
+  bool has_specular_term() const override { return true; }
+
+  Eigen::Vector3d diffuse_radiance(int texel,
+                                   const Direction& view,
+                                   const Direction& light) const override {
+    if (!(light.z() > 0.0)) return Eigen::Vector3d::Zero();
+    const Direction above(view.x(), view.y(), std::max(view.z(), 0.0));
+    return factor_towards(texel, above).cwiseProduct(lobes_.evaluate_diffuse(texel, light));
   }
 
   ModelShader shader() const override {
@@ -132,6 +141,7 @@ class ScaledLafortune final : public Material {
                                 lobes_.lobes);
     for (const char* part : {kElevatedConcentricGlsl,
                              kDirectionLookupGlsl,
+                             kSpecularWeightGlsl,
                              kTexelAtGlsl,
                              kLobesGlsl,
                              kLafortuneLobesGlsl,
@@ -173,6 +183,13 @@ class ScaledLafortune final : public Material {
   }
   Eigen::Vector3d factor(int texel, std::size_t view) const {
     return colour_at(factors_, at(texel, view));
+  }
+  Eigen::Vector3d factor_towards(int texel, const Direction& view) const {
+    const DirectionWeights v = views_.weights(view);
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (std::size_t i = 0; i < 3; ++i)
+      sum += v.weight[i] * factor(texel, static_cast<std::size_t>(v.index[i]));
+    return sum;
   }
 
   MaterialFrame frame_;
