@@ -77,8 +77,10 @@ BodyView PresenceFilter::update(const PoseEstimate& estimate, Time when) {
   when_ = when;
   const bool known = shown_.presence != Presence::kNone && shown_.presence != Presence::kLost;
   const double most = passed_s / options_.fade_s;
+  const bool first = known && before.presence == Presence::kNone;
   shown_.certainty =
-      std::clamp(known ? before.certainty + most : before.certainty - most, 0.0, 1.0);
+      first ? first_certainty_
+            : std::clamp(known ? before.certainty + most : before.certainty - most, 0.0, 1.0);
 
   const bool was_away = before.presence == Presence::kHeld || before.presence == Presence::kStale ||
                         before.presence == Presence::kLost;
