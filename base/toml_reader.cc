@@ -238,6 +238,21 @@ void TomlReader::read(std::string_view key, std::vector<double>& value) {
   });
 }
 
+void TomlReader::read(std::string_view key, std::vector<int>& value) {
+  VENEER_TOML_READ("a list of whole numbers", [&](const toml::node& node) {
+    const toml::array* array = node.as_array();
+    if (array == nullptr) return false;
+    std::vector<int> result;
+    for (const toml::node& element : *array) {
+      const std::optional<std::int64_t> got = element.value_exact<std::int64_t>();
+      if (!got || !std::in_range<int>(*got)) return false;
+      result.push_back(static_cast<int>(*got));
+    }
+    value = std::move(result);
+    return true;
+  });
+}
+
 void TomlReader::read(std::string_view key, std::vector<std::string>& value) {
   VENEER_TOML_READ("a list of texts in quotes", [&](const toml::node& node) {
     const toml::array* array = node.as_array();

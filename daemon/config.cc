@@ -64,6 +64,10 @@ Result<Config> Config::read(TomlReader& toml) {
   if (const Status status = config.prediction.check(); !status) {
     toml.add_error("prediction", status.error().what);
   }
+  TomlReader presence = toml.table("presence");
+  config.presence = tracking::PresenceOptions::read(presence);
+  TomlReader validation = toml.table("validation");
+  config.validation = tracking::ValidationOptions::read(validation);
   return config;
 }
 

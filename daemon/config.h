@@ -9,6 +9,8 @@
 #include "base/toml_reader.h"
 #include "render/renderer.h"
 #include "tracking/pose_track.h"
+#include "tracking/presence.h"
+#include "tracking/validator.h"
 
 namespace veneer::daemon {
 
@@ -35,6 +37,8 @@ struct Config {
   std::filesystem::path frame_log;  ///< CSV, a line a frame; none where empty
   render::RendererOptions render;
   tracking::PredictionOptions prediction;
+  tracking::PresenceOptions presence;
+  tracking::ValidationOptions validation;
 
   /// Reads all but [tracker] and [output]; the caller calls finish() when the drivers have read
   /// theirs.

@@ -3,6 +3,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <memory>
 
 #include "btf/material.h"
@@ -54,11 +55,11 @@ Result<Summary> run(const std::filesystem::path& config_path,
   spdlog::info("tracker: {}", tracker->description());
   spdlog::info("output: {}", output->description());
 
-  std::vector<tracking::BodyId> bodies{scene.observer_body};
-  if (scene.object_body >= 0 && scene.object_body != scene.observer_body) {
-    bodies.push_back(scene.object_body);
-  }
-  PoseFeed poses(*tracker, *clock, config.clock, bodies, config.prediction);
+  std::vector<tracking::BodyId> bodies = scene.observer_bodies;
+  if (scene.object_body >= 0) bodies.push_back(scene.object_body);
+  std::ranges::sort(bodies);
+  bodies.erase(std::unique(bodies.begin(), bodies.end()), bodies.end());
+  PoseFeed poses(*tracker, *clock, config.clock, bodies, config.prediction, config.validation);
   const Raster raster{profile.geometry.width, profile.geometry.height, profile.bits};
   FrameLoop loop(config, scene, raster, *clock, poses, *renderer, *output);
   VENEER_ASSIGN(const RunRecord record, loop.run(stop, progress));
@@ -69,6 +70,8 @@ Result<Summary> run(const std::filesystem::path& config_path,
   summary.tracker = tracker->description();
   summary.output = output->description();
   summary.tracker_lost = poses.lost();
+  summary.tracker_counters = tracker->status().counters;
+  summary.tracker_events = poses.events();
   summary.output_waits = output->waits();
   summary.clock = config.clock == ClockKind::kVirtual ? "virtual" : "monotonic";
   summary.settings = settings;

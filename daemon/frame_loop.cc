@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/frame_loop.h"
 
+#include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -31,6 +32,8 @@ FrameLoop::FrameLoop(const Config& config,
       raster_(raster),
       clock_(clock),
       poses_(poses),
+      observers_(poses, scene.observer_bodies, config.presence),
+      object_(config.presence),
       renderer_(renderer),
       output_(output),
       codes_(raster.width, raster.height),
@@ -39,10 +42,12 @@ FrameLoop::FrameLoop(const Config& config,
 Status FrameLoop::wait_for_first_pose(const std::atomic<bool>& stop) {
   constexpr Duration kStep = std::chrono::milliseconds(5);
   const Time deadline = clock_.now() + from_seconds(config_.first_pose_timeout_s);
-  const auto known = [this](tracking::BodyId body) {
-    return body < 0 || poses_.at(body, clock_.now()).origin != tracking::PoseOrigin::kNone;
+  const auto observer_known = [this] { return observers_.known(clock_.now()); };
+  const auto object_known = [this] {
+    return scene_.object_body < 0 ||
+           poses_.at(scene_.object_body, clock_.now()).origin != tracking::PoseOrigin::kNone;
   };
-  while (!stop && !(known(scene_.observer_body) && known(scene_.object_body))) {
+  while (!stop && !(observer_known() && object_known())) {
     VENEER_TRY(poses_.health());
     if (clock_.now() >= deadline) {
       return fail(
@@ -50,7 +55,8 @@ Status FrameLoop::wait_for_first_pose(const std::atomic<bool>& stop) {
           "waiting for the first pose: none came within {} s for body {}; is the tracker on "
           "and the body in its range?",
           config_.first_pose_timeout_s,
-          known(scene_.observer_body) ? scene_.object_body : scene_.observer_body);
+          observer_known() ? fmt::format("{}", scene_.object_body)
+                           : fmt::format("{}", fmt::join(observers_.bodies(), " or ")));
     }
     poses_.advance_to(clock_.now() + kStep);
   }
@@ -63,15 +69,22 @@ Result<FrameRecord> FrameLoop::make_frame(std::uint64_t number, Time start) {
   record.number = number;
   record.display_time = start + from_seconds(config_.display_latency_ms * 1e-3);
 
-  const tracking::PoseEstimate observer = poses_.at(scene_.observer_body, record.display_time);
-  record.origin = observer.origin;
-  record.pose_age_ms = 1e3 * to_seconds(observer.age);
-  record.eye_in_world = observer.world_from_body * scene_.eye_in_sensor;
-  render::FrameInput input{
-      record.eye_in_world, scene_.world_from_object, static_cast<std::uint32_t>(number)};
+  const Observers::View observer = observers_.at(record.display_time);
+  record.observer = observer.body;
+  record.presence = observer.seen.presence;
+  record.pose_age_ms = 1e3 * to_seconds(observer.estimate.age);
+  record.eye_in_world = observer.seen.world_from_body * scene_.eye_in_sensor;
+  // A highlight in the wrong place tells at once that nobody knows where the eye is.
+  record.specular_weight = observer.seen.certainty;
+  render::FrameInput input;
+  input.eye_in_world = record.eye_in_world;
+  input.world_from_object = scene_.world_from_object;
+  input.dither_seed = static_cast<std::uint32_t>(number);
+  input.specular_weight = record.specular_weight;
   if (scene_.object_body >= 0) {
-    input.world_from_object = poses_.at(scene_.object_body, record.display_time).world_from_body *
-                              scene_.world_from_object;
+    const tracking::PoseEstimate object = poses_.at(scene_.object_body, record.display_time);
+    input.world_from_object =
+        object_.update(object, record.display_time).world_from_body * scene_.world_from_object;
   }
   renderer_.draw(input);
 
@@ -111,7 +124,8 @@ Result<RunRecord> FrameLoop::run(const std::atomic<bool>& stop, Progress& progre
     } else {
       run.frames[number % kRememberedFrames] = record;
     }
-    if (record.origin == tracking::PoseOrigin::kHeld) ++run.held;
+    if (record.presence > tracking::Presence::kTracked) ++run.held;
+    if (record.presence == tracking::Presence::kLost) ++run.lost;
     if (!tracker_lost_ && poses_.lost()) {
       tracker_lost_ = true;
       spdlog::warn("{}; the picture stays as for the last pose", poses_.health().error().what);

@@ -12,6 +12,7 @@
 #include "base/progress.h"
 #include "base/result.h"
 #include "daemon/config.h"
+#include "daemon/observers.h"
 #include "daemon/pose_feed.h"
 #include "projector/output.h"
 #include "render/renderer.h"
@@ -23,10 +24,12 @@ namespace veneer::daemon {
 struct FrameRecord {
   std::uint64_t number = 0;
   Time display_time;
-  double frame_ms = 0;     ///< real time from the pose query to the frame handed over
-  double pose_age_ms = 0;  ///< from the newest sample to the moment of display
-  tracking::PoseOrigin origin = tracking::PoseOrigin::kNone;
-  Eigen::Vector3d eye_in_world = Eigen::Vector3d::Zero();  ///< as predicted
+  double frame_ms = 0;            ///< real time from the pose query to the frame handed over
+  double pose_age_ms = 0;         ///< from the newest sample to the moment of display
+  tracking::BodyId observer = 0;  ///< whose picture it is
+  tracking::Presence presence = tracking::Presence::kNone;  ///< his
+  double specular_weight = 1;                               ///< FrameInput::specular_weight
+  Eigen::Vector3d eye_in_world = Eigen::Vector3d::Zero();   ///< as predicted and shown
   render::FrameStatistics statistics;
 };
 
@@ -40,6 +43,7 @@ struct RunRecord {
   std::uint64_t late = 0;           ///< frames that took longer than a period to make
   double seconds = 0;               ///< real time from the first frame to the last handed over
   std::uint64_t held = 0;  ///< frames drawn for a pose that was held, not measured or predicted
+  std::uint64_t lost = 0;  ///< of these, frames for an observer who was lost
 };
 
 /// The projector's raster.
@@ -74,6 +78,8 @@ class FrameLoop {
   Raster raster_;
   Clock& clock_;
   PoseFeed& poses_;
+  Observers observers_;
+  tracking::PresenceFilter object_;
   render::Renderer& renderer_;
   projector::Output& output_;
   Image<Rgb16> codes_;

@@ -72,7 +72,7 @@ class FrameLoopTest : public testing::Test {
   }
   Result<RunRecord> run(Time first_sample = Time{1ms}, Time tracker_end = Time{1h}) {
     MovingTracker tracker(clock_, first_sample, tracker_end);
-    PoseFeed poses(tracker, clock_, config_.clock, {0}, config_.prediction);
+    PoseFeed poses(tracker, clock_, config_.clock, {0}, config_.prediction, config_.validation);
     FrameLoop loop(config_, scene_, {4, 3, 8}, clock_, poses, renderer_, output_);
     SilentProgress silent;
     return loop.run(stop_, silent);
@@ -134,7 +134,7 @@ TEST_F(FrameLoopTest, SaysThatTheTrackerIsGoneBeforeTheFirstPose) {
 TEST_F(FrameLoopTest, GoesOnWithTheLastPoseWhenTheTrackerGoes) {
   const RunRecord record = run(Time{1ms}, Time{100ms}).value();
   EXPECT_EQ(record.count, 20U);
-  EXPECT_EQ(record.frames.back().origin, tracking::PoseOrigin::kHeld);
+  EXPECT_EQ(record.frames.back().presence, tracking::Presence::kStale);
   EXPECT_GT(record.held, 0U);
   EXPECT_TRUE(renderer_.inputs.back().eye_in_world.allFinite());
 }

@@ -17,6 +17,7 @@ class RecordingTracker final : public tracking::Tracker {
   [[nodiscard]] std::string description() const override;
   /// A recording that cannot be written (a full disk) is given up with one warning; poses go on.
   [[nodiscard]] Result<tracking::PoseSample> wait_pose(Duration timeout) override;
+  [[nodiscard]] tracking::TrackerStatus status() const override { return tracker_->status(); }
 
  private:
   std::unique_ptr<tracking::Tracker> tracker_;

@@ -7,6 +7,37 @@
 #include "base/statistics.h"
 
 namespace veneer::daemon {
+namespace {
+
+nlohmann::ordered_json json_of(const tracking::TrackerCounters& counters) {
+  return {
+      {"samples", counters.samples},
+      {"lost", counters.lost},
+      {"duplicates", counters.duplicates},
+      {"late", counters.late},
+      {"suspect", counters.suspect},
+      {"skipped_bytes", counters.skipped_bytes},
+      {"bad_frames", counters.bad_frames},
+      {"clock_outliers", counters.clock_outliers},
+      {"clock_restarts", counters.clock_restarts},
+      {"io_errors", counters.io_errors},
+      {"restarts", counters.restarts},
+      {"opened", counters.opened},
+      {"open_errors", counters.open_errors},
+  };
+}
+
+nlohmann::ordered_json json_of(const std::vector<TrackerEvent>& events) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const TrackerEvent& event : events) {
+    list.push_back({{"t_ns", event.time.time_since_epoch().count()},
+                    {"state", name_of(event.state)},
+                    {"detail", event.detail}});
+  }
+  return list;
+}
+
+}  // namespace
 
 Summary summarise(const RunRecord& run) {
   Summary summary;
@@ -36,6 +67,7 @@ Summary summarise(const RunRecord& run) {
   summary.dropped = run.dropped;
   summary.late = run.late;
   summary.held = run.held;
+  summary.lost = run.lost;
   return summary;
 }
 
@@ -66,8 +98,11 @@ Status write_summary(const Summary& summary, const std::filesystem::path& path) 
       {"dropped_frames", summary.dropped},
       {"late_frames", summary.late},
       {"held_frames", summary.held},
+      {"lost_frames", summary.lost},
       {"rejected_poses", summary.rejected_poses},
       {"tracker_lost", summary.tracker_lost},
+      {"tracker_counters", json_of(summary.tracker_counters)},
+      {"tracker_events", json_of(summary.tracker_events)},
       {"output_waits", summary.output_waits},
       {"out_of_gamut", summary.out_of_gamut},
       {"out_of_reach", summary.out_of_reach},
@@ -85,10 +120,12 @@ Status write_summary(const Summary& summary, const std::filesystem::path& path) 
 
 Status write_frame_log(const RunRecord& run, const std::filesystem::path& path) {
   std::string text =
-      "frame,display_time_ns,frame_ms,gpu_ms,pose_age_ms,eye_x,eye_y,eye_z,covered,out_of_gamut\n";
+      "frame,display_time_ns,frame_ms,gpu_ms,pose_age_ms,eye_x,eye_y,eye_z,covered,out_of_gamut,"
+      "observer,"
+      "presence,specular_weight\n";
   for (const FrameRecord& frame : run.frames) {
     const std::optional<double>& gpu_ms = frame.statistics.gpu_ms;
-    text += fmt::format("{},{},{:.4f},{},{:.4f},{:.6f},{:.6f},{:.6f},{},{}\n",
+    text += fmt::format("{},{},{:.4f},{},{:.4f},{:.6f},{:.6f},{:.6f},{},{},{},{},{:.4f}\n",
                         frame.number,
                         frame.display_time.time_since_epoch().count(),
                         frame.frame_ms,
@@ -98,7 +135,10 @@ Status write_frame_log(const RunRecord& run, const std::filesystem::path& path) 
                         frame.eye_in_world.y(),
                         frame.eye_in_world.z(),
                         frame.statistics.covered_pixels,
-                        frame.statistics.out_of_gamut_pixels);
+                        frame.statistics.out_of_gamut_pixels,
+                        frame.observer,
+                        name_of(frame.presence),
+                        frame.specular_weight);
   }
   return write_text(path, text);
 }

@@ -20,8 +20,11 @@ struct Summary {
   std::uint64_t dropped = 0;
   std::uint64_t late = 0;
   std::uint64_t held = 0;  ///< frames drawn for a pose that was only held
+  std::uint64_t lost = 0;  ///< of these, frames for an observer who was lost
   std::uint64_t rejected_poses = 0;
   bool tracker_lost = false;
+  tracking::TrackerCounters tracker_counters;
+  std::vector<TrackerEvent> tracker_events;
   std::uint64_t output_waits = 0;  ///< how often a frame had to wait for the output
   double out_of_gamut = 0;         ///< fraction of the covered pixels, over all frames
   double out_of_reach = 0;         ///< likewise, too dark for the projector's angle
@@ -41,7 +44,7 @@ struct Summary {
 /// Written whole or not at all.
 [[nodiscard]] Status write_summary(const Summary& summary, const std::filesystem::path& path);
 /// CSV: frame, display_time_ns, frame_ms, gpu_ms, pose_age_ms, eye x, y, z, pixels covered and out
-/// of gamut.
+/// of gamut, observer (a body), his presence, specular_weight.
 [[nodiscard]] Status write_frame_log(const RunRecord& run, const std::filesystem::path& path);
 
 }  // namespace veneer::daemon

@@ -76,8 +76,20 @@ void read_object(TomlReader toml, Scene& scene) {
 }
 
 void read_observer(TomlReader toml, Scene& scene) {
-  toml.read("tracker_body", scene.observer_body);
-  if (scene.observer_body < 0) toml.add_error("tracker_body", "must be a body's number, 0 or more");
+  const bool several = toml.contains("tracker_bodies");
+  const std::string_view key = several ? "tracker_bodies" : "tracker_body";
+  if (several && toml.contains("tracker_body")) {
+    toml.add_error(key, "stands beside tracker_body; give one of them");
+  }
+  if (several) {
+    toml.read(key, scene.observer_bodies);
+  } else {
+    toml.read(key, scene.observer_bodies.front());
+  }
+  if (scene.observer_bodies.empty()) toml.add_error(key, "must name a body");
+  for (const int body : scene.observer_bodies) {
+    if (body < 0) toml.add_error(key, "must be bodies' numbers, 0 or more");
+  }
   toml.read("eye_in_sensor", scene.eye_in_sensor);
   if (!scene.eye_in_sensor.allFinite()) toml.add_error("eye_in_sensor", "must be finite");
 }

@@ -35,7 +35,7 @@ using Light = std::variant<DirectionalLight, PointLight>;
 ///     rotation_deg = [0, 0, 0]       # about x, then y, then z
 ///     tracker_body = -1              # >= 0: the pose comes from the tracker instead
 ///     [observer]
-///     tracker_body = 0
+///     tracker_body = 0               # or tracker_bodies = [1, 2]: whoever is seen
 ///     eye_in_sensor = [0.0, 0.0, 0.0]  # metres in the body's frame
 ///     [[light]]                      # one or more; at most 4
 ///     kind = "directional"           # or "point"
@@ -48,7 +48,7 @@ struct Scene {
   Eigen::Vector2d texture_repeats{1, 1};
   RigidTransform world_from_object;
   int object_body = -1;
-  int observer_body = 0;
+  std::vector<int> observer_bodies{0};
   Eigen::Vector3d eye_in_sensor = Eigen::Vector3d::Zero();
   std::vector<Light> lights;
 

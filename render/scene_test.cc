@@ -59,7 +59,7 @@ intensity_cd = 10
   ASSERT_TRUE(scene) << scene.error().what;
   EXPECT_EQ(scene->texture_repeats, Eigen::Vector2d(6, 3));
   EXPECT_EQ(scene->object_body, 2);
-  EXPECT_EQ(scene->observer_body, 1);
+  EXPECT_EQ(scene->observer_bodies, std::vector{1});
   EXPECT_EQ(scene->eye_in_sensor, Vector3d(0.01, 0.02, 0.03));
   // About x first: y becomes z. Then about y: z becomes x.
   const Vector3d moved = scene->world_from_object * Vector3d::UnitY();
@@ -78,7 +78,7 @@ TEST_F(SceneTest, NeedsOnlyMeshAndOneLight) {
   const auto scene = load(std::string("mesh = \"sphere\"\n") + kLight);
   ASSERT_TRUE(scene) << scene.error().what;
   EXPECT_EQ(scene->object_body, -1);
-  EXPECT_EQ(scene->observer_body, 0);
+  EXPECT_EQ(scene->observer_bodies, std::vector{0});
 }
 
 TEST_F(SceneTest, RefusesWhatItDoesNotKnow) {

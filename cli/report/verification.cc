@@ -157,7 +157,7 @@ Result<RunVerification> verify_run(const VerificationOptions& options, Progress&
     VerifiedFrame verified;
     verified.number = frame.number;
     verified.eye_in_world =
-        run.world_from_body(scene.observer_body, frame.display_time) * scene.eye_in_sensor;
+        run.world_from_body(scene.observer_bodies.front(), frame.display_time) * scene.eye_in_sensor;
     const RigidTransform world_from_object =
         scene.object_body < 0
             ? scene.world_from_object
