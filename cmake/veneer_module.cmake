@@ -86,6 +86,22 @@ function(veneer_add_module name)
   endif()
 endfunction()
 
+# veneer_add_fuzzer(NAME SRCS ... [DEPS ...])
+#
+# Makes the libFuzzer program veneer_NAME_fuzzer, in a build that is instrumented for it (the preset
+# fuzz); ./dev fuzz runs each for a bounded time.
+add_custom_target(veneer_fuzzers)
+function(veneer_add_fuzzer name)
+  if(NOT VENEER_FUZZERS)
+    return()
+  endif()
+  cmake_parse_arguments(F "" "" "SRCS;DEPS" ${ARGN})
+  add_executable(veneer_${name}_fuzzer ${F_SRCS})
+  target_link_libraries(veneer_${name}_fuzzer PRIVATE ${F_DEPS})
+  target_link_options(veneer_${name}_fuzzer PRIVATE -fsanitize=fuzzer)
+  add_dependencies(veneer_fuzzers veneer_${name}_fuzzer)
+endfunction()
+
 # veneer_embed(TARGET FILE...)
 #
 # Embeds text files (shaders) into TARGET: shaders/x.frag becomes the header "<folder>/shaders/x.frag.inc",

@@ -8,46 +8,19 @@
 #include <numbers>
 
 #include "base/random.h"
+#include "tracking/testing/freed_writer.h"
 #include "tracking/testing/protocol_laws.h"
 
 namespace veneer::tracking {
 namespace {
 
-using Bytes = std::vector<std::byte>;
 using Eigen::Vector3d;
+using freed::Bytes;
+using freed::Message;
 
 /// Angles come in steps of 1/32768 degree, 5e-7 rad: an axis is no nearer than that to where it
 /// should point.
 constexpr double kAngleStep_rad = 6e-7;
-
-/// A D1 message, written from the table of the manual and apart from what reads it.
-struct Message {
-  int camera = 1;
-  double pan_deg = 0;
-  double tilt_deg = 0;
-  double roll_deg = 0;
-  Vector3d position_mm = Vector3d::Zero();  // x, y, height
-  int zoom = 0;
-  int focus = 0;
-  int user = 0;
-
-  [[nodiscard]] Bytes bytes() const {
-    Bytes out{std::byte{0xD1}, static_cast<std::byte>(camera)};
-    const auto put = [&out](long value, int count) {
-      for (int shift = 8 * (count - 1); shift >= 0; shift -= 8)
-        out.push_back(static_cast<std::byte>(value >> shift & 0xFF));
-    };
-    for (const double angle : {pan_deg, tilt_deg, roll_deg}) put(std::lround(angle * 32768), 3);
-    for (const double length : position_mm) put(std::lround(length * 64), 3);
-    put(zoom, 3);
-    put(focus, 3);
-    put(user, 2);
-    int sum = 0;
-    for (const std::byte each : out) sum += std::to_integer<int>(each);
-    put(0x40 - sum, 1);
-    return out;
-  }
-};
 
 std::vector<RawSample> feed(FreedProtocol& protocol, const Bytes& datagram) {
   std::vector<RawSample> samples;
