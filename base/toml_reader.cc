@@ -297,6 +297,11 @@ std::vector<TomlReader> TomlReader::tables(std::string_view key) {
   return readers;
 }
 
+void TomlReader::ignore_the_rest() {
+  if (node_->table == nullptr) return;
+  for (const auto& [key, value] : *node_->table) node_->known.emplace(key.str());
+}
+
 void TomlReader::add_error(std::string_view key, std::string_view text) {
   const toml::node* value = node_->table == nullptr ? nullptr : node_->table->get(key);
   const auto line = value == nullptr ? 0U : value->source().begin.line;

@@ -59,6 +59,9 @@ class TomlReader {
   [[nodiscard]] TomlReader table(std::string_view key);
   /// The tables of an array of tables `[[key]]`; none where it is absent.
   [[nodiscard]] std::vector<TomlReader> tables(std::string_view key);
+  /// Takes what has not been asked for in this table as known: it is the business of another
+  /// program that reads the same file. Tables below it that were asked for are still checked.
+  void ignore_the_rest();
   /// Records a mistake at `key`, for values out of range: "file:line: key: text".
   void add_error(std::string_view key, std::string_view text);
   /// The folder of the file, to which relative paths in it refer.

@@ -113,6 +113,17 @@ TEST(TomlReader, LetsSettingsReplaceWhatTheFileSays) {
   EXPECT_NE(bad.error().what.find("render dither"), std::string::npos);
 }
 
+TEST(TomlReader, LeavesTheRestOfATableToOthersButNotThatOfTheTablesInIt) {
+  TomlReader toml = TomlReader::parse("a = 1\n[mine]\nb = 2\nc = 3\n[other]\nd = 4\n", "t").value();
+  int b = 0;
+  toml.table("mine").read("b", b);
+  toml.ignore_the_rest();
+  const Status status = toml.finish();
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().what.find("t:4: mine.c: unknown key"), 0U) << status.error().what;
+  EXPECT_EQ(status.error().what.find('\n'), std::string::npos) << status.error().what;
+}
+
 TEST(TomlReader, NamesTheLineOfASyntaxError) {
   const auto toml = TomlReader::parse("a = 1\nb = \n", "t.toml");
   ASSERT_FALSE(toml);
