@@ -34,6 +34,7 @@ constexpr std::array kCommands{
     Command{"import", "Bring measured data of another format to a sample set", &cli::run_import},
     Command{"render", "Draw one projector frame of a scene", &cli::run_render},
     Command{"synthesize", "Path-trace a material as a sample set", &cli::run_synthesize},
+    Command{"track", "List, watch and record trackers", &cli::run_track},
     Command{"verify",
             "Show recorded frames on the virtual bench and compare with the material",
             &cli::run_verify},

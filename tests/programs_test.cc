@@ -6,48 +6,18 @@
 
 #include <chrono>
 #include <csignal>
-#include <cstdio>
 #include <fstream>
 #include <thread>
 
 #include "base/files.h"
 #include "base/safetensors.h"
 #include "base/testing/temporary_folder.h"
+#include "tests/program.h"
 
 namespace veneer {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct Outcome {
-  int exit_code = -1;  // 128 + n for signal n
-  std::string out;     // standard output
-  std::string err;     // standard error
-};
-
-/// Runs `PROGRAM ARGUMENTS`, a shell's line, from the folder of the programs.
-Outcome run(const std::string& line) {
-  const TemporaryFolder folder;
-  const std::string out = (folder.path() / "out").string();
-  const std::string err = (folder.path() / "err").string();
-  const std::string command =
-      fmt::format("exec {}/{} >{} 2>{} </dev/null", VENEER_PROGRAMS, line, out, err);
-  const int status = std::system(command.c_str());
-  Outcome outcome;
-  outcome.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  outcome.out = read_text(out).value_or("");
-  outcome.err = read_text(err).value_or("");
-  return outcome;
-}
-
-testing::AssertionResult fails(const Outcome& outcome, int exit_code, std::string_view message) {
-  if (outcome.exit_code == exit_code && outcome.err.find(message) != std::string::npos) {
-    return testing::AssertionSuccess();
-  }
-  return testing::AssertionFailure() << "expected exit code " << exit_code << " and \"" << message
-                                     << "\", got " << outcome.exit_code << " and\n"
-                                     << outcome.err;
-}
 
 /// A tiny polarised sample set, a material fitted to it, a profile and a run's configuration, made
 /// once by the programs themselves.
