@@ -189,7 +189,9 @@ void DeviceTracker::on_started() {
 void DeviceTracker::receive(Time deadline) {
   const Time restart_at =
       std::max(newest_sample_, newest_restart_) + kSilence + 4 * protocol_->period();
-  const Time reopen_at = newest_bytes_ + kDeadSilence + 4 * protocol_->period();
+  const Time reopen_at = protocol_->recovery() == Recovery::kListen
+                             ? Time::max()
+                             : newest_bytes_ + kDeadSilence + 4 * protocol_->period();
   const Received received = transport_->read(buffer_, std::min({deadline, restart_at, reopen_at}));
   if (received.status == IoStatus::kOk) {
     newest_bytes_ = std::max(newest_bytes_, received.arrival);
@@ -207,12 +209,30 @@ void DeviceTracker::receive(Time deadline) {
                       port_->description(),
                       to_seconds(now - newest_bytes_)));
   } else if (now >= restart_at) {
+    on_silence(now);
+  }
+}
+
+void DeviceTracker::on_silence(Time now) {
+  const Recovery recovery = protocol_->recovery();
+  const std::string text = fmt::format(
+      "{} has sent no pose for {:.2f} s", port_->description(), to_seconds(now - newest_sample_));
+  if (recovery == Recovery::kTellAgain) {
     count([](TrackerCounters& counters) { ++counters.restarts; });
-    start(protocol_->restart(),
-          TrackerState::kSilent,
-          fmt::format("{} has sent no pose for {:.2f} s; it was told again to send",
-                      port_->description(),
-                      to_seconds(now - newest_sample_)));
+    start(protocol_->restart(), TrackerState::kSilent, text + "; it was told again to send");
+    return;
+  }
+  newest_restart_ = now;
+  if (recovery == Recovery::kListen) {
+    set_state(TrackerState::kSilent, text + "; does it send, and to here?");
+    return;
+  }
+  set_state(TrackerState::kSilent, text + "; it was asked whether it is there");
+  for (const Command& command : protocol_->restart()) {
+    const IoStatus status = transport_->write(command.bytes, now + kWriteTime);
+    if (status == IoStatus::kOk) continue;
+    on_error(status);
+    return;
   }
 }
 
@@ -237,7 +257,12 @@ void DeviceTracker::take_bytes(std::span<const std::byte> bytes, Time arrival) {
       return;
     }
   }
-  if (protocol_->wants_restart() && clock_.now() - newest_restart_ >= kSilence) {
+  if (protocol_->wants_restart() && protocol_->recovery() != Recovery::kTellAgain) {
+    close(TrackerState::kFailed,
+          fmt::format("{} says what is not understood; is it what it should be, in a version that "
+                      "is known here? It is opened again",
+                      port_->description()));
+  } else if (protocol_->wants_restart() && clock_.now() - newest_restart_ >= kSilence) {
     count([](TrackerCounters& counters) { ++counters.restarts; });
     start(protocol_->restart(),
           TrackerState::kInitialising,

@@ -67,6 +67,7 @@ class DeviceTracker final : public Tracker {
   void try_to_open(Time deadline);
   void initialise(Time deadline);
   void receive(Time deadline);
+  void on_silence(Time now);
   void start(std::vector<Command> commands, TrackerState state, std::string detail);
   /// All commands are sent.
   void on_started();

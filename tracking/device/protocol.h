@@ -44,6 +44,13 @@ struct Command {
   Duration pause{};
 };
 
+/// What is done with a device that has fallen silent.
+enum class Recovery {
+  kTellAgain,  ///< it begins anew with restart(); opened again when not a byte comes
+  kAsk,        ///< restart() goes into the conversation as it is; likewise
+  kListen,     ///< nothing: nobody can be told, and what is open stays open
+};
+
 struct ProtocolCounters {
   std::uint64_t skipped_bytes = 0;  ///< that belong to no frame
   std::uint64_t bad_frames = 0;     ///< of a wrong size, checksum, station or version
@@ -57,7 +64,8 @@ class Protocol {
   virtual ~Protocol() = default;
   /// Makes the device send, whatever it did before; sent after every opening.
   [[nodiscard]] virtual std::vector<Command> start() const = 0;
-  /// Sent when it has fallen silent.
+  [[nodiscard]] virtual Recovery recovery() const { return Recovery::kTellAgain; }
+  /// Sent when it has fallen silent, but for kListen.
   [[nodiscard]] virtual std::vector<Command> restart() const { return start(); }
   /// What the ticks of its samples are; nothing where they have none.
   [[nodiscard]] virtual std::optional<DeviceClock> clock() const = 0;
@@ -73,8 +81,8 @@ class Protocol {
                     std::vector<RawSample>& samples,
                     std::vector<std::byte>& reply) = 0;
   /// Whether the device has forgotten what it was told and must be started again (it answers in
-  /// text where binary was agreed on, it has lost its mode) or has refused to work with us.
-  /// feed() sets it, reset() clears it.
+  /// text where binary was agreed on, it has lost its mode) or has refused to work with us. Where
+  /// recovery() is not kTellAgain, it is opened again instead. feed() sets it, reset() clears it.
   [[nodiscard]] virtual bool wants_restart() const { return false; }
   [[nodiscard]] virtual ProtocolCounters counters() const = 0;
 };
