@@ -5,9 +5,11 @@
 #include <array>
 #include <string>
 
+#include "tracking/drivers/freed/freed_tracker.h"
 #include "tracking/drivers/replay/replay_tracker.h"
 #include "tracking/drivers/simulated/simulated_tracker.h"
 #include "tracking/drivers/simulated_device/simulated_device.h"
+#include "tracking/drivers/vrpn/vrpn_tracker.h"
 
 namespace veneer::tracking {
 namespace {
@@ -18,11 +20,13 @@ Result<std::unique_ptr<Tracker>> open_as_tracker(TomlReader& config, Clock& cloc
 }
 
 constexpr std::array kDrivers{
+    Driver{"freed", "camera trackers and robotic heads that send FreeD by UDP", &open_freed},
     Driver{"replay", "a recording, at its own pace", &open_as_tracker<ReplayTracker>},
     Driver{"simulated", "bodies on scripted paths", &open_as_tracker<SimulatedTracker>},
     Driver{"simulated-device",
            "the same behind a real protocol, with planned faults",
            &open_simulated_device},
+    Driver{"vrpn", "a tracker of a VRPN server", &open_vrpn},
 };
 static_assert(std::ranges::is_sorted(kDrivers, {}, &Driver::name));
 

@@ -21,7 +21,9 @@ template <class T>
 void put(Bytes& out, T value) {
   static_assert(sizeof(T) == 4 || sizeof(T) == 8);
   const auto raw = std::bit_cast<std::array<std::byte, sizeof(T)>>(value);
-  out.insert(out.end(), raw.rbegin(), raw.rend());  // the machines we build for are little-endian
+  // Last byte first, since the machines we build for are little-endian; one by one, since g++ 12
+  // warns of an overflow that is none when it inlines insert().
+  for (std::size_t i = raw.size(); i > 0; --i) out.push_back(raw[i - 1]);
 }
 
 inline Bytes operator+(Bytes a, const Bytes& b) {

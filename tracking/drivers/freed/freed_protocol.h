@@ -26,6 +26,7 @@ class FreedProtocol final : public Protocol {
   FreedProtocol(Up up, double rate_hz) : up_(up), rate_hz_(rate_hz) {}
 
   [[nodiscard]] std::vector<Command> start() const override { return {}; }
+  [[nodiscard]] Recovery recovery() const override { return Recovery::kListen; }
   [[nodiscard]] std::optional<DeviceClock> clock() const override { return std::nullopt; }
   [[nodiscard]] std::optional<WrappingCounter> sequence() const override { return std::nullopt; }
   [[nodiscard]] Duration period() const override { return from_seconds(1 / rate_hz_); }

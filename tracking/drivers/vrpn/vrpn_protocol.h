@@ -30,6 +30,7 @@ class VrpnProtocol final : public Protocol {
 
   /// The greeting, and what the tracker and its messages are called by us.
   [[nodiscard]] std::vector<Command> start() const override;
+  [[nodiscard]] Recovery recovery() const override { return Recovery::kAsk; }
   /// A ping: a server may be silent because nothing is in view.
   [[nodiscard]] std::vector<Command> restart() const override;
   [[nodiscard]] std::optional<DeviceClock> clock() const override {
