@@ -72,7 +72,7 @@ Result<int> list(CommandLine& line, const TrackOptions& options) {
   std::string text = "drivers";
   for (const tracking::Driver& driver : tracking::drivers()) {
     json["drivers"].push_back({{"name", driver.name}, {"summary", driver.summary}});
-    text += fmt::format("\n  {:<12} {}", driver.name, driver.summary);
+    text += fmt::format("\n  {:<16} {}", driver.name, driver.summary);
   }
   const std::vector<tracking::UsbDevice> devices = tracking::usb_devices();
   text += devices.empty() ? "\nno tracker that is known is plugged in" : "\nplugged in";
@@ -84,7 +84,7 @@ Result<int> list(CommandLine& line, const TrackOptions& options) {
                                   {"serial", device.serial},
                                   {"port", device.port},
                                   {"needs_firmware", device.needs_firmware}});
-    text += fmt::format("\n  {:<12} {} {:04x}:{:04x}, port {}{}{}{}",
+    text += fmt::format("\n  {:<16} {} {:04x}:{:04x}, port {}{}{}{}",
                         device.driver,
                         device.model,
                         device.vendor,
