@@ -41,6 +41,9 @@ struct FitOptions {
   /// How the GPU keeps what dominates a model's size, where it offers several: "8bit" or
   /// "float16"; empty takes the model's own choice (revised-lpca, eigen-texture: 8bit).
   std::string precision;
+  /// How dichromatic-lpca keeps its specular term: "product" (empty takes it) over view and light,
+  /// "half-angle" over the isotropic angles of Rusinkiewicz, or "measured", whichever serves.
+  std::string specular;
   /// Columns of the randomised basis in which clusters are found; 0 fits in the full space.
   int basis = 160;
   /// Lloyd iterations at most, from each start and after each swap of clusters.

@@ -64,7 +64,19 @@ struct Fitted {
   std::unique_ptr<btf::Material> material;
 };
 
-// Every model in the forms of `components` that it knows: with weights in one texel and in two.
+// So that a fit takes no time.
+btf::FitOptions quick_options(const char* components) {
+  btf::FitOptions options;
+  options.clusters = 3;
+  options.components = components;
+  options.angular = 8;
+  options.basis = 24;  // of 64 texels
+  options.iterations = 5;
+  return options;
+}
+
+// Every model in the forms of `components` that it knows: with weights in one texel and in two; and
+// the other ways to keep the specular term.
 std::vector<Fitted> fit_all(const btf::SampleSet& set) {
   std::vector<Fitted> all;
   SilentProgress progress;
@@ -73,13 +85,7 @@ std::vector<Fitted> fit_all(const btf::SampleSet& set) {
     std::string refusals;
     for (const char* components : {"5", "3+1", "6+2"}) {
       if (model.terms == 0 && all.size() > before) break;  // it does not read them
-      btf::FitOptions options;
-      options.clusters = 3;
-      options.components = components;
-      options.angular = 8;
-      options.basis = 24;  // of 64 texels, so that a fit takes no time
-      options.iterations = 5;
-      auto material = model.fit(set, options, progress);
+      auto material = model.fit(set, quick_options(components), progress);
       if (material) {
         all.push_back({fmt::format("{} {}", model.name, components), std::move(*material)});
       } else {
@@ -89,6 +95,11 @@ std::vector<Fitted> fit_all(const btf::SampleSet& set) {
     }
     EXPECT_GT(all.size(), before) << model.name << " fits in no form:\n" << refusals;
   }
+  btf::FitOptions options = quick_options("5+5");
+  options.specular = "half-angle";
+  auto material = (*btf::find_model("dichromatic-lpca"))->fit(set, options, progress);
+  EXPECT_TRUE(material) << material.error().what;
+  if (material) all.push_back({"dichromatic-lpca half-angle", std::move(*material)});
   return all;
 }
 

@@ -26,7 +26,8 @@ inline constexpr int kMostComponents = 16;
 [[nodiscard]] Result<std::array<int, 2>> parse_two_terms(std::string_view text,
                                                          std::string_view model);
 
-/// For models of one form. Errors: kInvalidOption where the options ask for another.
+/// For models of one form, whose terms are kept in one way. Errors: kInvalidOption where the
+/// options ask for another.
 [[nodiscard]] Status refuse_form(const FitOptions& options, std::string_view model);
 
 /// For models that keep everything in one precision. Errors: kInvalidOption.

@@ -13,6 +13,7 @@ set(VENEER_MODEL_SRCS
   models/eigen_rgb.cc
   models/eigen_texture/eigen_images.cc
   models/eigen_texture/eigen_texture.cc
+  models/half_angle.cc
   models/lafortune/lafortune.cc
   models/lobes/lafortune_lobes.cc
   models/lobes/lobe_fit.cc
@@ -36,6 +37,8 @@ set(VENEER_MODEL_TESTS
   models/cluster_volume_test.cc
   models/direction_lookup_test.cc
   models/eigen_texture/eigen_texture_test.cc
+  models/dichromatic_lpca/dichromatic_lpca_test.cc
+  models/half_angle_test.cc
   models/lafortune/lafortune_test.cc
   models/lobes/lobe_fit_test.cc
   models/lobes/lobe_models_test.cc
@@ -50,6 +53,7 @@ set(VENEER_MODEL_SHADERS
   models/direction_lookup.glsl
   models/eigen_texture/eigen_texture.glsl
   models/elevated_concentric.glsl
+  models/half_angle.glsl
   models/lafortune/lafortune.glsl
   models/lobes/lafortune_lobes.glsl
   models/lobes/lobes.glsl

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "btf/models/packed_lpca.h"
 
+#include <Eigen/QR>
+
 #include <algorithm>
+#include <cmath>
+#include <numeric>
 
 #include "base/parallel.h"
 #include "btf/models/components.h"
@@ -21,14 +25,24 @@ constexpr char kTexelAtGlsl[] =
 constexpr char kClusterVolumeGlsl[] =
 #include "btf/models/cluster_volume.glsl.inc"
     ;
+constexpr char kHalfAngleGlsl[] =
+#include "btf/models/half_angle.glsl.inc"
+    ;
 
-int volumes_for(const PackedLpca::Components& components) {
-  return (components[0] + components[1] + kScalarsPerVolume - 1) / kScalarsPerVolume;
+int volumes_for(int components) { return (components + kScalarsPerVolume - 1) / kScalarsPerVolume; }
+
+int all_components(const PackedLpca::Layout& layout) {
+  return layout.components[0] + layout.components[1];
+}
+
+// The lane of a texel's first colour, behind the weights.
+int colour_lane_of(const PackedLpca::Layout& layout) {
+  return volumes_for(all_components(layout)) * kScalarsPerVolume;
 }
 
 // The lane of a texel's cluster: the last, behind weights and colours.
 int cluster_lane_of(const PackedLpca::Layout& layout) {
-  return volumes_for(layout.components) * kScalarsPerVolume + 3 * layout.colours;
+  return colour_lane_of(layout) + 3 * layout.colours;
 }
 PackedTexels texels_of(const PackedLpca::Layout& layout) {
   return PackedTexels(cluster_lane_of(layout) + 1);
@@ -38,7 +52,10 @@ PackedTexels texels_of(const PackedLpca::Layout& layout) {
 double volume_bytes(const MaterialFrame& frame, const PackedLpca::Layout& layout, int clusters) {
   const double nodes = layout.angular * layout.angular;
   const double view_nodes = frame.views.size() == 1 ? 1.0 : nodes;
-  return view_nodes * nodes * clusters * volumes_for(layout.components) *
+  const int components = layout.half_angle ? layout.components[0] : all_components(layout);
+  const double half_angle =
+      layout.half_angle ? double(half_angle::kNodes) * volumes_for(layout.components[1]) : 0.0;
+  return (view_nodes * nodes * volumes_for(components) + half_angle) * clusters *
          static_cast<double>(bytes_per_texel(TexelFormat::kRgba16f));
 }
 
@@ -78,18 +95,121 @@ PackedLpca::PackedLpca(MaterialFrame frame, Layout layout, LpcaFactors factors)
       factors_(std::move(factors)),
       views_(frame_.views, DirectionRole::kView, layout.angular),
       lights_(frame_.lights, layout.beyond, layout.angular),
-      place_(factors_.clusters, views_.nodes(), lights_.nodes(), 1) {
+      place_(factors_.clusters, views_.nodes(), lights_.nodes(), 1),
+      half_place_(factors_.clusters) {
   fill_volumes();
 }
 
-int PackedLpca::volume_count() const { return volumes_for(layout_.components); }
+int PackedLpca::product_components() const {
+  return layout_.half_angle ? layout_.components[0] : all_components(layout_);
+}
+
+int PackedLpca::product_volumes() const { return volumes_for(product_components()); }
+
+int PackedLpca::volume_count() const {
+  return product_volumes() + volumes_for(all_components(layout_) - product_components());
+}
+
+PackedLpca::Slot PackedLpca::slot(int component) const {
+  const int beyond = component - product_components();
+  const int first = beyond < 0 ? 0 : product_volumes();
+  const int at = beyond < 0 ? component : beyond;
+  return {static_cast<std::size_t>(first + at / kScalarsPerVolume),
+          static_cast<std::size_t>(at % kScalarsPerVolume)};
+}
+
+// [cluster * component][pair]
+RowMatrix PackedLpca::second_brdfs() const {
+  const auto [first, count] = layout_.components;
+  RowMatrix brdfs(factors_.clusters * count, frame_.pair_count());
+  for (int k = 0; k < factors_.clusters; ++k)
+    for (int j = 0; j < count; ++j) {
+      const std::span<const Eigen::half> brdf = factors_.eigen_brdf(k, first + j);
+      std::ranges::transform(brdf, brdfs.row(k * count + j).begin(), [](Eigen::half value) {
+        return static_cast<float>(value);
+      });
+    }
+  return brdfs;
+}
+
+PackedLpca PackedLpca::with_half_angle(const Read& read, Communicator& ranks) const {
+  const int first = layout_.components[0];
+  const int count = layout_.components[1];
+  const RowMatrix brdfs = half_angle::values_at(
+      frame_.views, frame_.lights, half_angle::fill(frame_.views, frame_.lights, second_brdfs()));
+  LpcaFactors factors = factors_;
+  const auto components = static_cast<std::size_t>(factors.components);
+  const auto columns = static_cast<std::size_t>(factors.columns);
+  std::vector<Eigen::MatrixXf> weights_from_values;  // of each cluster, the pseudo-inverse
+  for (int k = 0; k < factors.clusters; ++k) {
+    RowMatrix own = brdfs.middleRows(k * count, count);
+    for (int j = 0; j < count; ++j) {
+      const float largest = own.row(j).cwiseAbs().maxCoeff();
+      if (largest > 0.0F) own.row(j) /= largest;
+      const std::size_t at =
+          static_cast<std::size_t>(k) * components + static_cast<std::size_t>(first + j);
+      std::ranges::transform(
+          own.row(j),
+          factors.eigen_brdfs.begin() + static_cast<std::ptrdiff_t>(at * columns),
+          saturated_half);
+    }
+    const Eigen::MatrixXd gram = (own * own.transpose()).cast<double>();
+    weights_from_values.emplace_back(
+        (gram.completeOrthogonalDecomposition().pseudoInverse() * own.cast<double>())
+            .cast<float>());
+  }
+  const RowRange own = rows_of_rank(frame_.texel_count(), ranks);
+  std::vector<Eigen::half> weights(static_cast<std::size_t>(own.count) *
+                                   static_cast<std::size_t>(count));
+  parallel_for(own.count, 16, [&](std::int64_t begin, std::int64_t end) {
+    Eigen::VectorXf other(frame_.pair_count());
+    Eigen::VectorXf values(frame_.pair_count());
+    for (auto i = static_cast<int>(begin); i < end; ++i) {
+      const int texel = own.first + i;
+      read(texel, {other.data(), columns}, {values.data(), columns});
+      const Eigen::VectorXf found =
+          weights_from_values[factors.cluster[static_cast<std::size_t>(texel)]] * values;
+      std::ranges::transform(found, weights.begin() + std::ptrdiff_t{i} * count, saturated_half);
+    }
+  });
+  weights = gather<Eigen::half>(ranks, weights);
+  for (std::size_t texel = 0; texel < factors.cluster.size(); ++texel)
+    for (int j = 0; j < count; ++j)
+      factors.weights[texel * components + static_cast<std::size_t>(first + j)] =
+          weights[texel * static_cast<std::size_t>(count) + static_cast<std::size_t>(j)];
+  Layout layout = layout_;
+  layout.half_angle = true;
+  return PackedLpca(frame_, layout, std::move(factors));
+}
+
+double PackedLpca::second_rmse(const Read& read) const {
+  constexpr int kTexels = 64;
+  const int texels = std::min(frame_.texel_count(), kTexels);
+  std::vector<double> squares(static_cast<std::size_t>(texels));
+  parallel_for(texels, 1, [&](std::int64_t begin, std::int64_t end) {
+    std::vector<float> first(static_cast<std::size_t>(frame_.pair_count()));
+    std::vector<float> second(first.size());
+    for (std::int64_t i = begin; i < end; ++i) {
+      const auto texel = static_cast<int>(i * frame_.texel_count() / texels);
+      read(texel, first, second);
+      auto wanted = second.begin();
+      for (const Direction& view : frame_.views)
+        for (const Direction& light : frame_.lights) {
+          const double off = evaluate(texel, view, light)[1] - static_cast<double>(*wanted++);
+          squares[static_cast<std::size_t>(i)] += off * off;
+        }
+    }
+  });
+  return std::sqrt(std::accumulate(squares.begin(), squares.end(), 0.0) /
+                   (texels * double(frame_.pair_count())));
+}
 
 void PackedLpca::fill_volumes() {
-  volumes_.assign(static_cast<std::size_t>(volume_count()),
+  volumes_.assign(static_cast<std::size_t>(product_volumes()),
                   std::vector<Eigen::half>(place_.texel_count() * kScalarsPerVolume));
   parallel_for(factors_.clusters, 1, [&](std::int64_t begin, std::int64_t end) {
     for (auto k = static_cast<int>(begin); k < end; ++k) {
-      for (int j = 0; j < factors_.components; ++j) {
+      for (int j = 0; j < product_components(); ++j) {
         const RowMatrix measured =
             Eigen::Map<
                 const Eigen::Matrix<Eigen::half, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
@@ -98,28 +218,43 @@ void PackedLpca::fill_volumes() {
                 static_cast<Eigen::Index>(frame_.lights.size()))
                 .cast<float>();
         const RowMatrix nodes = lights_.fill() * (views_.fill() * measured).transpose();
-        std::vector<Eigen::half>& volume =
-            volumes_[static_cast<std::size_t>(j / kScalarsPerVolume)];
+        const Slot at = slot(j);
         for (Eigen::Index l = 0; l < nodes.rows(); ++l)
           for (Eigen::Index v = 0; v < nodes.cols(); ++v) {
             const std::size_t texel = place_.texel(k, 0, static_cast<int>(v), static_cast<int>(l));
-            volume[texel * kScalarsPerVolume + static_cast<std::size_t>(j % kScalarsPerVolume)] =
+            volumes_[at.volume][texel * kScalarsPerVolume + at.channel] =
                 saturated_half(nodes(l, v));
           }
       }
     }
   });
+  if (layout_.half_angle) fill_half_angles();
+}
+
+void PackedLpca::fill_half_angles() {
+  const auto [first, count] = layout_.components;
+  volumes_.resize(static_cast<std::size_t>(volume_count()),
+                  std::vector<Eigen::half>(half_place_.texel_count() * kScalarsPerVolume));
+  const RowMatrix nodes = half_angle::fill(frame_.views, frame_.lights, second_brdfs());
+  for (int k = 0; k < factors_.clusters; ++k)
+    for (int j = 0; j < count; ++j) {
+      const Slot at = slot(first + j);
+      for (int node = 0; node < half_angle::kNodes; ++node)
+        volumes_[at.volume][half_place_.texel(k, node) * kScalarsPerVolume + at.channel] =
+            saturated_half(nodes(k * count + j, node));
+    }
 }
 
 Result<PackedLpca> PackedLpca::load(const SafetensorsFile& file,
                                     DirectionRole beyond,
-                                    int colours) {
+                                    int colours,
+                                    bool half_angle) {
   VENEER_ASSIGN(MaterialFrame frame, read_frame(file));
   VENEER_ASSIGN(const std::string text, file.meta("components"));
   const auto components = parse_two_terms(text, "a model of two terms");
   if (!components)
     return fail(Errc::kBadFormat, "reading {}: {}", file.path().string(), components.error().what);
-  Layout layout{*components, 0, beyond, colours};
+  Layout layout{*components, 0, beyond, colours, half_angle};
   VENEER_ASSIGN(layout.angular,
                 read_integer(file, "angular", FitOptions::kLeastAngular, FitOptions::kMostAngular));
   VENEER_ASSIGN(LpcaFactors factors,
@@ -155,20 +290,25 @@ Eigen::Vector2d PackedLpca::evaluate(int texel,
   const int k = factors_.cluster[static_cast<std::size_t>(texel)];
   const std::span<const Eigen::half> weight = factors_.weights_of(texel);
   Eigen::Vector2d scalars = Eigen::Vector2d::Zero();
+  const auto add = [&](int component, std::size_t at, double share) {
+    const Slot from = slot(component);
+    scalars[component < layout_.components[0] ? 0 : 1] +=
+        share * static_cast<double>(weight[static_cast<std::size_t>(component)]) *
+        static_cast<double>(volumes_[from.volume][at * kScalarsPerVolume + from.channel]);
+  };
   for (std::size_t i = 0; i < 4; ++i) {
     if (l.weight[i] == 0.0) continue;
     for (std::size_t n = 0; n < 4; ++n) {
       const std::size_t at = place_.texel(k, 0, v.node[n], l.node[i]);
-      for (int j = 0; j < factors_.components; ++j) {
-        const std::vector<Eigen::half>& volume =
-            volumes_[static_cast<std::size_t>(j / kScalarsPerVolume)];
-        const auto value = static_cast<double>(
-            volume[at * kScalarsPerVolume + static_cast<std::size_t>(j % kScalarsPerVolume)]);
-        scalars[j < layout_.components[0] ? 0 : 1] +=
-            l.weight[i] * v.weight[n] * static_cast<double>(weight[static_cast<std::size_t>(j)]) *
-            value;
-      }
+      for (int j = 0; j < product_components(); ++j) add(j, at, l.weight[i] * v.weight[n]);
     }
+  }
+  if (!layout_.half_angle) return scalars;
+  const half_angle::NodeWeights half = half_angle::weights(view, light);
+  for (std::size_t i = 0; i < half.node.size(); ++i) {
+    const std::size_t at = half_place_.texel(k, half.node[i]);
+    for (int j = layout_.components[0]; j < factors_.components; ++j)
+      add(j, at, std::max(light.z(), 0.0) * half.weight[i]);
   }
   return scalars;
 }
@@ -187,8 +327,21 @@ ModelTexture PackedLpca::pack_texels(std::span<const Eigen::half> colours) const
   });
 }
 
+ModelTexture PackedLpca::volume_texture(int volume) const {
+  const bool half_angle = volume >= product_volumes();
+  ModelTexture texture{.sampler = fmt::format("Volume{}", volume),
+                       .kind = TextureKind::k3D,
+                       .format = TexelFormat::kRgba16f,
+                       .width = half_angle ? half_place_.width() : place_.width(),
+                       .height = half_angle ? half_place_.height() : place_.height(),
+                       .depth = half_angle ? half_place_.depth() : place_.depth(),
+                       .linear = true};
+  texture.data = texture_data(volumes_[static_cast<std::size_t>(volume)]);
+  return texture;
+}
+
 ModelShader PackedLpca::shader(std::span<const Eigen::half> colours) const {
-  const int first_colour = volume_count() * kScalarsPerVolume;
+  const int first_colour = colour_lane_of(layout_);
   const int cluster_lane = cluster_lane_of(layout_);
   const PackedTexels texels = texels_of(layout_);
   const auto lane = [](int index) { return PackedTexels::half_lane(index); };
@@ -204,18 +357,16 @@ ModelShader PackedLpca::shader(std::span<const Eigen::half> colours) const {
   source += kElevatedConcentricGlsl;
   source += kTexelAtGlsl;
   source += kClusterVolumeGlsl;
+  if (layout_.half_angle) source += half_place_.constants() + kHalfAngleGlsl;
 
   // What a texel makes of the scalars, wherever these come from.
   std::string mix;
-  for (int v = 0; v < volume_count(); ++v)
-    for (int c = 0; c < kScalarsPerVolume && v * kScalarsPerVolume + c < factors_.components; ++c) {
-      const int j = v * kScalarsPerVolume + c;
-      mix += fmt::format("  scalars.{} += {} * eigen[{}].{};\n",
-                         j < layout_.components[0] ? "x" : "y",
-                         lane(j),
-                         v,
-                         "xyzw"[c]);
-    }
+  for (int j = 0; j < factors_.components; ++j)
+    mix += fmt::format("  scalars.{} += {} * eigen[{}].{};\n",
+                       j < layout_.components[0] ? "x" : "y",
+                       lane(j),
+                       slot(j).volume,
+                       "xyzw"[slot(j).channel]);
   for (int c = 0; c < layout_.colours; ++c)
     mix += fmt::format("  colours[{}] = vec3({}, {}, {});\n",
                        c,
@@ -226,28 +377,37 @@ ModelShader PackedLpca::shader(std::span<const Eigen::half> colours) const {
                                   texels.fetch(),
                                   PackedTexels::uint_lane(cluster_lane));
   fetch += fmt::format("  scalars = vec2(0.0);\n  vec4 eigen[{}];\n", volume_count());
-  std::string volumes;
-  for (int v = 0; v < volume_count(); ++v)
-    volumes += fmt::format("  eigen[{0}] = volume_fetch(Volume{0}, place, 0.0);\n", v);
+  const auto volumes = [&](std::string_view cluster,
+                           std::string_view view,
+                           std::string_view light) {
+    std::string code =
+        fmt::format("  VolumePlace place = volume_place({}, {}, {});\n", cluster, view, light);
+    for (int v = 0; v < product_volumes(); ++v)
+      code += fmt::format("  eigen[{0}] = volume_fetch(Volume{0}, place, 0.0);\n", v);
+    if (layout_.half_angle)
+      code +=
+          fmt::format("  vec3 half_place = half_angle_place({}, {}, {});\n", cluster, view, light);
+    for (int v = product_volumes(); v < volume_count(); ++v)
+      code +=
+          fmt::format("  eigen[{0}] = {1}.z * textureLod(Volume{0}, half_place, 0.0);\n", v, light);
+    return code;
+  };
 
   const std::string results =
       fmt::format("out vec2 scalars, out vec3 colours[{}]", layout_.colours);
-  source += fmt::format(
-      "void packed_evaluate(vec2 uv, vec3 view, vec3 light, {}) {{\n{}"
-      "  VolumePlace place = volume_place(cluster, view, light);\n{}{}}}\n",
-      results,
-      fetch,
-      volumes,
-      mix);
+  source += fmt::format("void packed_evaluate(vec2 uv, vec3 view, vec3 light, {}) {{\n{}{}{}}}\n",
+                        results,
+                        fetch,
+                        volumes("cluster", "view", "light"),
+                        mix);
   source += fmt::format(
       "#ifdef CACHE_NODES\n"
       "struct EigenPlace {{ vec3 view; vec3 light; }};\n"
       "EigenPlace eigen_place(vec3 view, vec3 light) {{ return EigenPlace(view, light); }}\n"
-      "void eigen_values(EigenPlace at, int cluster, out vec4 eigen[{0}]) {{\n"
-      "  VolumePlace place = volume_place(uint(cluster), at.view, at.light);\n{1}"
+      "void eigen_values(EigenPlace at, int cluster, out vec4 eigen[{0}]) {{\n{1}"
       "  for (int v = 0; v < {0}; ++v) eigen[v] *= at.light.z > 0.0 ? 1.0 : 0.0;\n}}\n#endif\n",
       volume_count(),
-      volumes);
+      volumes("uint(cluster)", "at.view", "at.light"));
   source += fmt::format(
       "#ifdef CACHE_PIXELS\n"
       "void packed_cached(vec2 uv, {}) {{\n{}"
@@ -260,18 +420,8 @@ ModelShader PackedLpca::shader(std::span<const Eigen::half> colours) const {
   ModelShader shader;
   shader.source = std::move(source);
   shader.textures.push_back(pack_texels(colours));
-  for (int v = 0; v < volume_count(); ++v) {
-    ModelTexture volume{.sampler = fmt::format("Volume{}", v),
-                        .kind = TextureKind::k3D,
-                        .format = TexelFormat::kRgba16f,
-                        .width = place_.width(),
-                        .height = place_.height(),
-                        .depth = place_.depth(),
-                        .linear = true};
-    volume.data = texture_data(volumes_[static_cast<std::size_t>(v)]);
-    shader.textures.push_back(std::move(volume));
-  }
-  shader.fetches = texels.words() + 2 * volume_count();
+  for (int v = 0; v < volume_count(); ++v) shader.textures.push_back(volume_texture(v));
+  shader.fetches = texels.words() + product_volumes() + volume_count();
   shader.cache = EigenCache{
       .clusters = factors_.clusters, .layers = volume_count(), .texel_fetches = texels.words()};
   return shader;

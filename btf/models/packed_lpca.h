@@ -7,6 +7,7 @@
 
 #include "btf/models/angular_grid.h"
 #include "btf/models/cluster_volume.h"
+#include "btf/models/half_angle.h"
 #include "btf/models/lpca_factors.h"
 
 namespace veneer::btf {
@@ -15,6 +16,9 @@ namespace veneer::btf {
 /// of scalar Eigen-BRDFs that are packed four to an RGBA volume and drawn with hardware
 /// interpolation in three of the four directions' coordinates: two fetches for four components.
 /// What models of two terms (scalar times colour) have in common. Immutable and thread-safe.
+///
+/// The second function may be one of the half angle instead (half_angle.h), in volumes of its own:
+/// one fetch for four components, and a fortieth of the bytes.
 ///
 /// Sources: Schneider 2004, "Real-time BTF Rendering", section 6.2 (two fetches, the fourth
 /// coordinate mixed by hand); Mueller et al. 2003 (clusters).
@@ -29,7 +33,8 @@ class PackedLpca {
     Components components{};
     int angular = 16;
     DirectionRole beyond = DirectionRole::kLight;
-    int colours = 1;  ///< of a texel, 1 or 2
+    int colours = 1;          ///< of a texel, 1 or 2
+    bool half_angle = false;  ///< of the second function; fit() leaves that to with_half_angle()
   };
 
   /// Refuses, with `code`, volumes and textures larger than GPUs take. fit() and load() ask it too;
@@ -48,11 +53,20 @@ class PackedLpca {
   /// Reads what add_to() wrote, within the limits of fit(). Errors: kBadFormat.
   [[nodiscard]] static Result<PackedLpca> load(const SafetensorsFile& file,
                                                DirectionRole beyond,
-                                               int colours);
+                                               int colours,
+                                               bool half_angle = false);
   void add_to(Material::Contents& contents) const;
 
   [[nodiscard]] const MaterialFrame& frame() const { return frame_; }
+  [[nodiscard]] bool has_half_angle() const { return layout_.half_angle; }
   [[nodiscard]] const Components& components() const { return layout_.components; }
+  /// The same with the nearest second function of the half angle: its Eigen-BRDFs are taken there,
+  /// and its weights found anew.
+  /// @param read, ranks  as fit() had them.
+  [[nodiscard]] PackedLpca with_half_angle(const Read& read, Communicator& ranks) const;
+  /// How far the second function of texels evenly chosen is from what `read` gives, as drawn at
+  /// the measured pairs: root mean square.
+  [[nodiscard]] double second_rmse(const Read& read) const;
   /// As Material::values_per_texel(), without colours.
   [[nodiscard]] double values_per_texel() const {
     return factors_.values_per_texel(frame_.texel_count());
@@ -74,9 +88,21 @@ class PackedLpca {
 
  private:
   PackedLpca(MaterialFrame frame, Layout layout, LpcaFactors factors);
+  // Where a component stands: which volume, and which of its four channels.
+  struct Slot {
+    std::size_t volume;
+    std::size_t channel;
+  };
+  [[nodiscard]] Slot slot(int component) const;
+  // Volumes over view and light; those of the half angle come behind them.
+  [[nodiscard]] int product_volumes() const;
+  [[nodiscard]] int product_components() const;
   [[nodiscard]] int volume_count() const;
   [[nodiscard]] ModelTexture pack_texels(std::span<const Eigen::half> colours) const;
+  [[nodiscard]] ModelTexture volume_texture(int volume) const;
   void fill_volumes();
+  void fill_half_angles();
+  [[nodiscard]] RowMatrix second_brdfs() const;
 
   MaterialFrame frame_;
   Layout layout_;
@@ -84,6 +110,7 @@ class PackedLpca {
   AngularGrid views_;
   AngularGrid lights_;
   ClusterVolume place_;
+  half_angle::Volume half_place_;
   std::vector<std::vector<Eigen::half>> volumes_;  // [volume][texel][4]
 };
 

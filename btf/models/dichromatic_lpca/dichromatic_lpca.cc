@@ -17,12 +17,18 @@ constexpr std::string_view kName = "dichromatic-lpca";
 constexpr std::string_view kLearned = "learned";
 constexpr std::string_view kRatio = "ratio";
 constexpr std::string_view kSubtractive = "subtractive";
+constexpr std::string_view kProduct = "product";
+constexpr std::string_view kHalfAngle = "half-angle";
+constexpr std::string_view kMeasured = "measured";
 constexpr int kColours = 1;  // of a texel in the shader
 
 // |D_ref| under this is noise: a thousandth of a white diffuser, the black noise of 12-bit capture.
 constexpr float kNoise = 1e-3F;
 // Keeps the fade defined for lights measured down to the horizon.
 constexpr double kLeastCosine = 1e-6;
+// "measured" keeps the half angle while its error of the specular term is at most so many times
+// that of the product: a difference that nobody sees.
+constexpr double kHalfAngleServes = 1.05;
 
 constexpr char kSpecularWeightGlsl[] =
 #include "btf/models/specular_weight.glsl.inc"
@@ -61,6 +67,26 @@ Status check_form(std::string_view form, Errc code, std::string_view doing) {
               kLearned,
               kRatio,
               kSubtractive);
+}
+
+Status check_specular(const FitOptions& options, std::string_view form) {
+  const std::string& specular = options.specular;
+  if (!specular.empty() && specular != kProduct && specular != kHalfAngle && specular != kMeasured)
+    return fail(Errc::kInvalidOption,
+                "fit: specular is \"{}\"; {} knows {}, {} and {}",
+                specular,
+                kName,
+                kProduct,
+                kHalfAngle,
+                kMeasured);
+  if (specular == kHalfAngle && form == kSubtractive)
+    return fail(
+        Errc::kInvalidOption,
+        "fit: a specular term over the {} has a cosine of its own, and form \"{}\" fades all "
+        "terms together; choose another form",
+        kHalfAngle,
+        kSubtractive);
+  return {};
 }
 
 bool lower(const Direction& a, const Direction& b) { return a.z() < b.z(); }
@@ -164,6 +190,7 @@ class Dichromatic final : public Material {
     Contents contents;
     scalars_.add_to(contents);
     contents.metadata["form"] = terms_.form;
+    contents.metadata["specular"] = scalars_.has_half_angle() ? kHalfAngle : kProduct;
     contents.metadata["masked_texels"] = fmt::format("{}", terms_.masked_texels);
     contents.tensors.push_back(
         tensor_of("diffuse_reference", {scalars_.frame().texel_count(), 3}, reference_));
@@ -255,6 +282,18 @@ Terms find_terms(const SampleSet& set,
   return terms;
 }
 
+// Whether the specular term may be kept over the half angle.
+bool serves(const PackedLpca& half_angle,
+            const PackedLpca& product,
+            const PackedLpca::Read& read,
+            Progress& progress) {
+  progress.start("specular term", 1);
+  const double with = half_angle.second_rmse(read);
+  const double without = product.second_rmse(read);
+  progress.finish(fmt::format("rmse {:.3g} over the half angle, {:.3g} without", with, without));
+  return with <= kHalfAngleServes * without;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Material>> fit_dichromatic_lpca(const SampleSet& set,
@@ -266,6 +305,7 @@ Result<std::unique_ptr<Material>> fit_dichromatic_lpca(const SampleSet& set,
                 parse_two_terms(options.components, kName));
   const std::string form = options.form.empty() ? std::string(kLearned) : options.form;
   VENEER_TRY(check_form(form, Errc::kInvalidOption, "fit"));
+  VENEER_TRY(check_specular(options, form));
   if (!set.info().polarised)
     return fail(
         Errc::kInvalidOption,
@@ -297,6 +337,11 @@ Result<std::unique_ptr<Material>> fit_dichromatic_lpca(const SampleSet& set,
     Eigen::Map<Eigen::VectorXf>(specular.data(), samples.rows()) = samples * terms.specular_colour;
   };
   VENEER_ASSIGN(PackedLpca scalars, PackedLpca::fit(frame, options, layout, read, progress));
+  const bool measured = options.specular == kMeasured && !terms.subtractive;
+  if (measured || options.specular == kHalfAngle) {
+    PackedLpca half_angle = scalars.with_half_angle(read, *options.ranks);
+    if (!measured || serves(half_angle, scalars, read, progress)) scalars = std::move(half_angle);
+  }
   return std::make_unique<Dichromatic>(std::move(scalars), std::move(terms), std::move(reference));
 }
 
@@ -304,7 +349,21 @@ Result<std::unique_ptr<Material>> load_dichromatic_lpca(const SafetensorsFile& f
   VENEER_ASSIGN(const std::string form, file.meta("form"));
   VENEER_TRY(check_form(form, Errc::kBadFormat, fmt::format("reading {}", file.path().string())));
   Terms terms = Terms::of(form);
-  VENEER_ASSIGN(PackedLpca scalars, PackedLpca::load(file, beyond(terms.subtractive), kColours));
+  // Files from before there was a choice hold products.
+  const std::string specular = file.meta("specular").value_or(std::string(kProduct));
+  if (specular != kProduct && (specular != kHalfAngle || terms.subtractive))
+    return fail(Errc::kBadFormat,
+                "reading {}: specular is \"{}\" in form \"{}\"; {} knows {}, and {} but in form {}",
+                file.path().string(),
+                specular,
+                form,
+                kName,
+                kProduct,
+                kHalfAngle,
+                kSubtractive);
+  VENEER_ASSIGN(
+      PackedLpca scalars,
+      PackedLpca::load(file, beyond(terms.subtractive), kColours, specular == kHalfAngle));
   const int texels = scalars.frame().texel_count();
   VENEER_ASSIGN(terms.masked_texels, read_integer(file, "masked_texels", 0, texels));
   for (const auto& [name, colour] : {std::pair{"specular_colour", &terms.specular_colour},

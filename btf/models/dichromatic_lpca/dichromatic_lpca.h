@@ -19,6 +19,12 @@ namespace veneer::btf {
 /// what
 ///   the shadow takes away and d its one colour. A light beyond the data fades the sum of all
 ///   three.
+/// The specular scalar p may be kept over the isotropic half angle (half_angle.h) in place of view
+/// and light (FitOptions::specular): a volume of its own, one fetch for four components instead of
+/// two, for materials whose gloss has the texel's own normal and no grain. "measured" fits both and
+/// keeps it where its error of the specular term is at most 5 % above the product's. Not with form
+/// "subtractive".
+///
 /// Texels whose D_ref (the root mean square of D, where learned) is under the noise have no colour
 /// to scale: their diffuse part is drawn as 0, and metadata "masked_texels" says how many they are.
 ///
