@@ -44,6 +44,9 @@ struct FitOptions {
   /// How dichromatic-lpca keeps its specular term: "product" (empty takes it) over view and light,
   /// "half-angle" over the isotropic angles of Rusinkiewicz, or "measured", whichever serves.
   std::string specular;
+  /// Whether dichromatic-lpca finds the clusters of its two terms together: "joint" (empty takes
+  /// it), "separate", or "measured", whichever serves.
+  std::string clustering;
   /// Columns of the randomised basis in which clusters are found; 0 fits in the full space.
   int basis = 160;
   /// Lloyd iterations at most, from each start and after each swap of clusters.

@@ -76,7 +76,7 @@ btf::FitOptions quick_options(const char* components) {
 }
 
 // Every model in the forms of `components` that it knows: with weights in one texel and in two; and
-// the other ways to keep the specular term.
+// the other ways to keep and to cluster the specular term.
 std::vector<Fitted> fit_all(const btf::SampleSet& set) {
   std::vector<Fitted> all;
   SilentProgress progress;
@@ -95,11 +95,17 @@ std::vector<Fitted> fit_all(const btf::SampleSet& set) {
     }
     EXPECT_GT(all.size(), before) << model.name << " fits in no form:\n" << refusals;
   }
-  btf::FitOptions options = quick_options("5+5");
-  options.specular = "half-angle";
-  auto material = (*btf::find_model("dichromatic-lpca"))->fit(set, options, progress);
-  EXPECT_TRUE(material) << material.error().what;
-  if (material) all.push_back({"dichromatic-lpca half-angle", std::move(*material)});
+  for (const auto& [specular, clustering] :
+       {std::pair{"half-angle", "joint"}, {"product", "separate"}, {"half-angle", "separate"}}) {
+    btf::FitOptions options = quick_options("5+5");
+    options.specular = specular;
+    options.clustering = clustering;
+    auto material = (*btf::find_model("dichromatic-lpca"))->fit(set, options, progress);
+    EXPECT_TRUE(material) << material.error().what;
+    if (material)
+      all.push_back(
+          {fmt::format("dichromatic-lpca {} {}", specular, clustering), std::move(*material)});
+  }
   return all;
 }
 

@@ -48,11 +48,14 @@ Result<std::array<int, 2>> parse_two_terms(std::string_view text, std::string_vi
 }
 
 Status refuse_form(const FitOptions& options, std::string_view model) {
-  if (!options.specular.empty())
-    return fail(Errc::kInvalidOption,
-                "fit: specular is \"{}\"; {} offers no choice of it, leave it out",
-                options.specular,
-                model);
+  for (const auto& [name, value] :
+       {std::pair{"specular", &options.specular}, std::pair{"clustering", &options.clustering}})
+    if (!value->empty())
+      return fail(Errc::kInvalidOption,
+                  "fit: {} is \"{}\"; {} offers no choice of it, leave it out",
+                  name,
+                  *value,
+                  model);
   if (options.form.empty()) return {};
   return fail(Errc::kInvalidOption,
               "fit: form is \"{}\"; {} has only one form, leave it out",

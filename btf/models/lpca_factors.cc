@@ -21,13 +21,14 @@ double LpcaFactors::values_per_texel(int texels) const {
   return 1.0 + components + double(clusters) * components * columns / texels;
 }
 
-void LpcaFactors::reconstruct(int texel, int first, int count, std::span<float> values) const {
+void LpcaFactors::reconstruct(
+    int texel, int in_cluster, int first, int count, std::span<float> values) const {
   using Halves = Eigen::Map<const Eigen::Array<Eigen::half, Eigen::Dynamic, 1>>;
   Eigen::Map<Eigen::ArrayXf> sum(values.data(), static_cast<Eigen::Index>(values.size()));
   sum.setZero();
   const std::span<const Eigen::half> weight = weights_of(texel);
   for (int j = first; j < first + count; ++j) {
-    const auto brdf = eigen_brdf(cluster[static_cast<std::size_t>(texel)], j);
+    const auto brdf = eigen_brdf(in_cluster, j);
     sum += static_cast<float>(weight[static_cast<std::size_t>(j)]) *
            Halves(brdf.data(), columns).cast<float>();
   }
@@ -64,6 +65,35 @@ LpcaFactors factors_of(const LocalPca& pca) {
       factors.weights.push_back(saturated_half(
           pca.weights(texel, j) * scales(pca.cluster[static_cast<std::size_t>(texel)], j)));
   return factors;
+}
+
+LpcaFactors side_by_side(const LpcaFactors& first, const LpcaFactors& second) {
+  VENEER_CHECK(first.clusters == second.clusters && first.columns == second.columns);
+  LpcaFactors both;
+  both.clusters = first.clusters;
+  both.components = first.components + second.components;
+  both.columns = first.columns;
+  both.cluster = first.cluster;
+  // Rows of `left` and of `right` in turn.
+  const auto interleave = [](const std::vector<Eigen::half>& left,
+                             int left_row,
+                             const std::vector<Eigen::half>& right,
+                             int right_row) {
+    std::vector<Eigen::half> all;
+    all.reserve(left.size() + right.size());
+    auto next = right.begin();
+    for (auto row = left.begin(); row != left.end(); row += left_row, next += right_row) {
+      all.insert(all.end(), row, row + left_row);
+      all.insert(all.end(), next, next + right_row);
+    }
+    return all;
+  };
+  both.weights = interleave(first.weights, first.components, second.weights, second.components);
+  both.eigen_brdfs = interleave(first.eigen_brdfs,
+                                first.components * first.columns,
+                                second.eigen_brdfs,
+                                second.components * second.columns);
+  return both;
 }
 
 Status check_samples(const SampleSet& set, const FitOptions& options) {
@@ -111,7 +141,7 @@ Result<LpcaFactors> read_factors(const SafetensorsFile& file,
   factors.columns = columns;
   VENEER_ASSIGN(factors.eigen_brdfs, read_halves(file, "eigen_brdfs", brdfs.shape));
   VENEER_ASSIGN(factors.weights, read_halves(file, "weights", {texels, components}));
-  VENEER_ASSIGN(factors.cluster, read_clusters(file, texels, factors.clusters));
+  VENEER_ASSIGN(factors.cluster, read_clusters(file, "clusters", texels, factors.clusters));
   return factors;
 }
 

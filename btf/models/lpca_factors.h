@@ -20,12 +20,21 @@ struct LpcaFactors {
   [[nodiscard]] std::span<const Eigen::half> eigen_brdf(int in_cluster, int component) const;
   /// A texel's weights and cluster, and its share of the Eigen-BRDFs.
   [[nodiscard]] double values_per_texel(int texels) const;
-  /// The sum of the components [first, first + count) of a texel at every column.
-  void reconstruct(int texel, int first, int count, std::span<float> values) const;
+  /// The sum of the components [first, first + count) of a texel at every column, with those of a
+  /// cluster: the texel's own where none is named.
+  void reconstruct(int texel, int in_cluster, int first, int count, std::span<float> values) const;
+  void reconstruct(int texel, int first, int count, std::span<float> values) const {
+    reconstruct(texel, cluster[static_cast<std::size_t>(texel)], first, count, values);
+  }
 };
 
 /// @param pca  all parts with the same number of columns.
 [[nodiscard]] LpcaFactors factors_of(const LocalPca& pca);
+
+/// The factors of two functions that were clustered apart, into as many clusters each: every
+/// cluster has the Eigen-BRDFs of both, every texel the weights of both, and the first one's
+/// cluster.
+[[nodiscard]] LpcaFactors side_by_side(const LpcaFactors& first, const LpcaFactors& second);
 
 /// SampleSet::check_finite() of what each of options.ranks will read, with one outcome for all.
 [[nodiscard]] Status check_samples(const SampleSet& set, const FitOptions& options);

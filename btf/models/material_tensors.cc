@@ -96,16 +96,18 @@ Result<std::vector<Eigen::half>> read_halves(const SafetensorsFile& file,
 }
 
 Result<std::vector<std::uint8_t>> read_clusters(const SafetensorsFile& file,
+                                                const std::string& name,
                                                 int texels,
                                                 int clusters) {
-  VENEER_ASSIGN(const TensorView tensor, file.tensor("clusters", DType::kU8, {texels}));
+  VENEER_ASSIGN(const TensorView tensor, file.tensor(name, DType::kU8, {texels}));
   const std::span<const std::uint8_t> values = tensor.as<std::uint8_t>();
   const auto bad =
       std::ranges::find_if(values, [clusters](std::uint8_t k) { return k >= clusters; });
   if (bad != values.end())
     return fail(Errc::kBadFormat,
-                "reading {}: texel {} is in cluster {} of {}",
+                "reading {}: {}: texel {} is in cluster {} of {}",
                 file.path().string(),
+                name,
                 bad - values.begin(),
                 *bad,
                 clusters);

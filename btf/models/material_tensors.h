@@ -45,8 +45,9 @@ inline constexpr int kMostTextureSide = 16384;
 [[nodiscard]] Result<std::vector<Eigen::half>> read_halves(const SafetensorsFile& file,
                                                            const std::string& name,
                                                            const std::vector<std::int64_t>& shape);
-/// The cluster of every texel, each < clusters. Errors: kBadFormat.
+/// A tensor with the cluster of every texel, each < clusters. Errors: kBadFormat.
 [[nodiscard]] Result<std::vector<std::uint8_t>> read_clusters(const SafetensorsFile& file,
+                                                              const std::string& name,
                                                               int texels,
                                                               int clusters);
 

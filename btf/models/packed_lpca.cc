@@ -52,11 +52,13 @@ PackedTexels texels_of(const PackedLpca::Layout& layout) {
 double volume_bytes(const MaterialFrame& frame, const PackedLpca::Layout& layout, int clusters) {
   const double nodes = layout.angular * layout.angular;
   const double view_nodes = frame.views.size() == 1 ? 1.0 : nodes;
-  const int components = layout.half_angle ? layout.components[0] : all_components(layout);
-  const double half_angle =
-      layout.half_angle ? double(half_angle::kNodes) * volumes_for(layout.components[1]) : 0.0;
-  return (view_nodes * nodes * volumes_for(components) + half_angle) * clusters *
-         static_cast<double>(bytes_per_texel(TexelFormat::kRgba16f));
+  const auto [first, second] = layout.components;
+  double values = view_nodes * nodes * volumes_for(layout.separate ? first : first + second);
+  if (layout.half_angle)
+    values = view_nodes * nodes * volumes_for(first) + half_angle::kNodes * volumes_for(second);
+  else if (layout.separate)
+    values += view_nodes * nodes * volumes_for(second);
+  return values * clusters * static_cast<double>(bytes_per_texel(TexelFormat::kRgba16f));
 }
 
 }  // namespace
@@ -77,22 +79,40 @@ Result<PackedLpca> PackedLpca::fit(const MaterialFrame& frame,
                                    const Read& read,
                                    Progress& progress) {
   VENEER_TRY(check(frame, layout, options.clusters, Errc::kInvalidOption, "fit"));
-  const int pairs = frame.pair_count();
-  RowSource source;
-  source.rows = frame.texel_count();
-  source.part_columns = {pairs, pairs};
-  source.read = [&read, pairs](int texel, std::span<float> values) {
-    const auto count = static_cast<std::size_t>(pairs);
-    read(texel, values.first(count), values.last(count));
+  const auto count = static_cast<std::size_t>(frame.pair_count());
+  const auto source_of = [&](int parts, std::function<void(int, std::span<float>)> rows) {
+    return RowSource{frame.texel_count(),
+                     std::vector<int>(static_cast<std::size_t>(parts), frame.pair_count()),
+                     std::move(rows)};
   };
   const auto [first, second] = layout.components;
-  return PackedLpca(frame, layout, fit_factors(source, {first, second}, options, progress));
+  if (!layout.separate) {
+    const RowSource both = source_of(2, [&](int texel, std::span<float> values) {
+      read(texel, values.first(count), values.last(count));
+    });
+    return PackedLpca(frame, layout, fit_factors(both, {first, second}, options, progress), {});
+  }
+  const RowSource firsts = source_of(1, [&](int texel, std::span<float> values) {
+    std::vector<float> other(count);
+    read(texel, values, other);
+  });
+  const RowSource seconds = source_of(1, [&](int texel, std::span<float> values) {
+    std::vector<float> other(count);
+    read(texel, other, values);
+  });
+  const LpcaFactors a = fit_factors(firsts, {first}, options, progress);
+  LpcaFactors b = fit_factors(seconds, {second}, options, progress);
+  return PackedLpca(frame, layout, side_by_side(a, b), std::move(b.cluster));
 }
 
-PackedLpca::PackedLpca(MaterialFrame frame, Layout layout, LpcaFactors factors)
+PackedLpca::PackedLpca(MaterialFrame frame,
+                       Layout layout,
+                       LpcaFactors factors,
+                       std::vector<std::uint8_t> second_cluster)
     : frame_(std::move(frame)),
       layout_(layout),
       factors_(std::move(factors)),
+      second_cluster_(std::move(second_cluster)),
       views_(frame_.views, DirectionRole::kView, layout.angular),
       lights_(frame_.lights, layout.beyond, layout.angular),
       place_(factors_.clusters, views_.nodes(), lights_.nodes(), 1),
@@ -100,20 +120,23 @@ PackedLpca::PackedLpca(MaterialFrame frame, Layout layout, LpcaFactors factors)
   fill_volumes();
 }
 
-int PackedLpca::product_components() const {
-  return layout_.half_angle ? layout_.components[0] : all_components(layout_);
+std::array<int, 2> PackedLpca::clusters_of(int texel) const {
+  const auto at = static_cast<std::size_t>(texel);
+  return {factors_.cluster[at], layout_.separate ? second_cluster_[at] : factors_.cluster[at]};
 }
 
-int PackedLpca::product_volumes() const { return volumes_for(product_components()); }
+int PackedLpca::first_volumes() const {
+  return volumes_for(is_split() ? layout_.components[0] : all_components(layout_));
+}
 
 int PackedLpca::volume_count() const {
-  return product_volumes() + volumes_for(all_components(layout_) - product_components());
+  return first_volumes() + (is_split() ? volumes_for(layout_.components[1]) : 0);
 }
 
 PackedLpca::Slot PackedLpca::slot(int component) const {
-  const int beyond = component - product_components();
-  const int first = beyond < 0 ? 0 : product_volumes();
-  const int at = beyond < 0 ? component : beyond;
+  const bool behind = is_split() && component >= layout_.components[0];
+  const int first = behind ? first_volumes() : 0;
+  const int at = component - (behind ? layout_.components[0] : 0);
   return {static_cast<std::size_t>(first + at / kScalarsPerVolume),
           static_cast<std::size_t>(at % kScalarsPerVolume)};
 }
@@ -168,7 +191,7 @@ PackedLpca PackedLpca::with_half_angle(const Read& read, Communicator& ranks) co
       const int texel = own.first + i;
       read(texel, {other.data(), columns}, {values.data(), columns});
       const Eigen::VectorXf found =
-          weights_from_values[factors.cluster[static_cast<std::size_t>(texel)]] * values;
+          weights_from_values[static_cast<std::size_t>(clusters_of(texel)[1])] * values;
       std::ranges::transform(found, weights.begin() + std::ptrdiff_t{i} * count, saturated_half);
     }
   });
@@ -179,37 +202,42 @@ PackedLpca PackedLpca::with_half_angle(const Read& read, Communicator& ranks) co
           weights[texel * static_cast<std::size_t>(count) + static_cast<std::size_t>(j)];
   Layout layout = layout_;
   layout.half_angle = true;
-  return PackedLpca(frame_, layout, std::move(factors));
+  return PackedLpca(frame_, layout, std::move(factors), second_cluster_);
 }
 
-double PackedLpca::second_rmse(const Read& read) const {
+Eigen::Vector2d PackedLpca::rmse(const Read& read) const {
   constexpr int kTexels = 64;
   const int texels = std::min(frame_.texel_count(), kTexels);
-  std::vector<double> squares(static_cast<std::size_t>(texels));
+  std::vector<Eigen::Array2d> squares(static_cast<std::size_t>(texels), Eigen::Array2d::Zero());
   parallel_for(texels, 1, [&](std::int64_t begin, std::int64_t end) {
     std::vector<float> first(static_cast<std::size_t>(frame_.pair_count()));
     std::vector<float> second(first.size());
     for (std::int64_t i = begin; i < end; ++i) {
       const auto texel = static_cast<int>(i * frame_.texel_count() / texels);
       read(texel, first, second);
-      auto wanted = second.begin();
+      std::size_t pair = 0;
       for (const Direction& view : frame_.views)
         for (const Direction& light : frame_.lights) {
-          const double off = evaluate(texel, view, light)[1] - static_cast<double>(*wanted++);
-          squares[static_cast<std::size_t>(i)] += off * off;
+          const Eigen::Array2d wanted(static_cast<double>(first[pair]),
+                                      static_cast<double>(second[pair]));
+          squares[static_cast<std::size_t>(i)] +=
+              (evaluate(texel, view, light).array() - wanted).square();
+          ++pair;
         }
     }
   });
-  return std::sqrt(std::accumulate(squares.begin(), squares.end(), 0.0) /
-                   (texels * double(frame_.pair_count())));
+  Eigen::Array2d sum = Eigen::Array2d::Zero();
+  for (const Eigen::Array2d& square : squares) sum += square;
+  return (sum / (texels * double(frame_.pair_count()))).sqrt();
 }
 
 void PackedLpca::fill_volumes() {
-  volumes_.assign(static_cast<std::size_t>(product_volumes()),
+  const int products = layout_.half_angle ? layout_.components[0] : factors_.components;
+  volumes_.assign(static_cast<std::size_t>(layout_.half_angle ? first_volumes() : volume_count()),
                   std::vector<Eigen::half>(place_.texel_count() * kScalarsPerVolume));
   parallel_for(factors_.clusters, 1, [&](std::int64_t begin, std::int64_t end) {
     for (auto k = static_cast<int>(begin); k < end; ++k) {
-      for (int j = 0; j < product_components(); ++j) {
+      for (int j = 0; j < products; ++j) {
         const RowMatrix measured =
             Eigen::Map<
                 const Eigen::Matrix<Eigen::half, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
@@ -248,13 +276,14 @@ void PackedLpca::fill_half_angles() {
 Result<PackedLpca> PackedLpca::load(const SafetensorsFile& file,
                                     DirectionRole beyond,
                                     int colours,
+                                    bool separate,
                                     bool half_angle) {
   VENEER_ASSIGN(MaterialFrame frame, read_frame(file));
   VENEER_ASSIGN(const std::string text, file.meta("components"));
   const auto components = parse_two_terms(text, "a model of two terms");
   if (!components)
     return fail(Errc::kBadFormat, "reading {}: {}", file.path().string(), components.error().what);
-  Layout layout{*components, 0, beyond, colours, half_angle};
+  Layout layout{*components, 0, beyond, colours, separate, half_angle};
   VENEER_ASSIGN(layout.angular,
                 read_integer(file, "angular", FitOptions::kLeastAngular, FitOptions::kMostAngular));
   VENEER_ASSIGN(LpcaFactors factors,
@@ -262,12 +291,17 @@ Result<PackedLpca> PackedLpca::load(const SafetensorsFile& file,
                              frame.texel_count(),
                              layout.components[0] + layout.components[1],
                              frame.pair_count()));
+  std::vector<std::uint8_t> second_cluster;
+  if (separate) {
+    VENEER_ASSIGN(second_cluster,
+                  read_clusters(file, "second_clusters", frame.texel_count(), factors.clusters));
+  }
   VENEER_TRY(check(frame,
                    layout,
                    factors.clusters,
                    Errc::kBadFormat,
                    fmt::format("reading {}", file.path().string())));
-  return PackedLpca(std::move(frame), layout, std::move(factors));
+  return PackedLpca(std::move(frame), layout, std::move(factors), std::move(second_cluster));
 }
 
 void PackedLpca::add_to(Material::Contents& contents) const {
@@ -275,11 +309,15 @@ void PackedLpca::add_to(Material::Contents& contents) const {
   contents.metadata["components"] = format_components(layout_.components);
   contents.metadata["angular"] = fmt::format("{}", layout_.angular);
   add_factors(factors_, frame_.texel_count(), contents);
+  if (layout_.separate)
+    contents.tensors.push_back(
+        tensor_of("second_clusters", {frame_.texel_count()}, second_cluster_));
 }
 
 void PackedLpca::reconstruct(int texel, std::span<float> first, std::span<float> second) const {
-  factors_.reconstruct(texel, 0, layout_.components[0], first);
-  factors_.reconstruct(texel, layout_.components[0], layout_.components[1], second);
+  const std::array<int, 2> clusters = clusters_of(texel);
+  factors_.reconstruct(texel, clusters[0], 0, layout_.components[0], first);
+  factors_.reconstruct(texel, clusters[1], layout_.components[0], layout_.components[1], second);
 }
 
 Eigen::Vector2d PackedLpca::evaluate(int texel,
@@ -287,7 +325,7 @@ Eigen::Vector2d PackedLpca::evaluate(int texel,
                                      const Direction& light) const {
   const GridWeights v = views_.weights(view);
   const GridWeights l = lights_.weights(light);
-  const int k = factors_.cluster[static_cast<std::size_t>(texel)];
+  const std::array<int, 2> k = clusters_of(texel);
   const std::span<const Eigen::half> weight = factors_.weights_of(texel);
   Eigen::Vector2d scalars = Eigen::Vector2d::Zero();
   const auto add = [&](int component, std::size_t at, double share) {
@@ -296,17 +334,23 @@ Eigen::Vector2d PackedLpca::evaluate(int texel,
         share * static_cast<double>(weight[static_cast<std::size_t>(component)]) *
         static_cast<double>(volumes_[from.volume][at * kScalarsPerVolume + from.channel]);
   };
-  for (std::size_t i = 0; i < 4; ++i) {
-    if (l.weight[i] == 0.0) continue;
-    for (std::size_t n = 0; n < 4; ++n) {
-      const std::size_t at = place_.texel(k, 0, v.node[n], l.node[i]);
-      for (int j = 0; j < product_components(); ++j) add(j, at, l.weight[i] * v.weight[n]);
+  const auto add_products = [&](int in_cluster, int first, int end) {
+    for (std::size_t i = 0; i < 4; ++i) {
+      if (l.weight[i] == 0.0) continue;
+      for (std::size_t n = 0; n < 4; ++n) {
+        const std::size_t at = place_.texel(in_cluster, 0, v.node[n], l.node[i]);
+        for (int j = first; j < end; ++j) add(j, at, l.weight[i] * v.weight[n]);
+      }
     }
+  };
+  add_products(k[0], 0, layout_.components[0]);
+  if (!layout_.half_angle) {
+    add_products(k[1], layout_.components[0], factors_.components);
+    return scalars;
   }
-  if (!layout_.half_angle) return scalars;
   const half_angle::NodeWeights half = half_angle::weights(view, light);
   for (std::size_t i = 0; i < half.node.size(); ++i) {
-    const std::size_t at = half_place_.texel(k, half.node[i]);
+    const std::size_t at = half_place_.texel(k[1], half.node[i]);
     for (int j = layout_.components[0]; j < factors_.components; ++j)
       add(j, at, std::max(light.z(), 0.0) * half.weight[i]);
   }
@@ -323,12 +367,15 @@ ModelTexture PackedLpca::pack_texels(std::span<const Eigen::half> colours) const
     std::ranges::transform(colours.subspan(static_cast<std::size_t>(texel) * count, count),
                            lanes.subspan(lane - count).begin(),
                            bits);
-    lanes[lane] = factors_.cluster[static_cast<std::size_t>(texel)];
+    const std::array<int, 2> clusters = clusters_of(texel);
+    // Two clusters in a lane where each function has its own.
+    lanes[lane] =
+        static_cast<std::uint16_t>(clusters[0] | (layout_.separate ? clusters[1] << 8 : 0));
   });
 }
 
 ModelTexture PackedLpca::volume_texture(int volume) const {
-  const bool half_angle = volume >= product_volumes();
+  const bool half_angle = layout_.half_angle && volume >= first_volumes();
   ModelTexture texture{.sampler = fmt::format("Volume{}", volume),
                        .kind = TextureKind::k3D,
                        .format = TexelFormat::kRgba16f,
@@ -373,23 +420,29 @@ ModelShader PackedLpca::shader(std::span<const Eigen::half> colours) const {
                        lane(first_colour + 3 * c),
                        lane(first_colour + 3 * c + 1),
                        lane(first_colour + 3 * c + 2));
-  std::string fetch = fmt::format("  ivec2 texel = texel_at(uv);\n{}  uint cluster = {};\n",
+  std::string fetch = fmt::format("  ivec2 texel = texel_at(uv);\n{}  uint clusters = {};\n",
                                   texels.fetch(),
                                   PackedTexels::uint_lane(cluster_lane));
+  fetch += layout_.separate ? "  uvec2 cluster = uvec2(clusters & 255u, clusters >> 8);\n"
+                            : "  uvec2 cluster = uvec2(clusters);\n";
   fetch += fmt::format("  scalars = vec2(0.0);\n  vec4 eigen[{}];\n", volume_count());
-  const auto volumes = [&](std::string_view cluster,
-                           std::string_view view,
-                           std::string_view light) {
+  // The volumes at a place, the second function's at its own cluster.
+  const auto volumes = [&](std::string_view view, std::string_view light) {
     std::string code =
-        fmt::format("  VolumePlace place = volume_place({}, {}, {});\n", cluster, view, light);
-    for (int v = 0; v < product_volumes(); ++v)
+        fmt::format("  VolumePlace place = volume_place(cluster.x, {}, {});\n", view, light);
+    for (int v = 0; v < first_volumes(); ++v)
       code += fmt::format("  eigen[{0}] = volume_fetch(Volume{0}, place, 0.0);\n", v);
     if (layout_.half_angle)
       code +=
-          fmt::format("  vec3 half_place = half_angle_place({}, {}, {});\n", cluster, view, light);
-    for (int v = product_volumes(); v < volume_count(); ++v)
+          fmt::format("  vec3 half_place = half_angle_place(cluster.y, {}, {});\n", view, light);
+    else if (layout_.separate)
+      code += fmt::format("  place = volume_place(cluster.y, {}, {});\n", view, light);
+    for (int v = first_volumes(); v < volume_count(); ++v)
       code +=
-          fmt::format("  eigen[{0}] = {1}.z * textureLod(Volume{0}, half_place, 0.0);\n", v, light);
+          layout_.half_angle
+              ? fmt::format(
+                    "  eigen[{0}] = {1}.z * textureLod(Volume{0}, half_place, 0.0);\n", v, light)
+              : fmt::format("  eigen[{0}] = volume_fetch(Volume{0}, place, 0.0);\n", v);
     return code;
   };
 
@@ -398,30 +451,34 @@ ModelShader PackedLpca::shader(std::span<const Eigen::half> colours) const {
   source += fmt::format("void packed_evaluate(vec2 uv, vec3 view, vec3 light, {}) {{\n{}{}{}}}\n",
                         results,
                         fetch,
-                        volumes("cluster", "view", "light"),
+                        volumes("view", "light"),
                         mix);
   source += fmt::format(
       "#ifdef CACHE_NODES\n"
       "struct EigenPlace {{ vec3 view; vec3 light; }};\n"
       "EigenPlace eigen_place(vec3 view, vec3 light) {{ return EigenPlace(view, light); }}\n"
-      "void eigen_values(EigenPlace at, int cluster, out vec4 eigen[{0}]) {{\n{1}"
+      "void eigen_values(EigenPlace at, int in_cluster, out vec4 eigen[{0}]) {{\n"
+      "  uvec2 cluster = uvec2(in_cluster);\n{1}"
       "  for (int v = 0; v < {0}; ++v) eigen[v] *= at.light.z > 0.0 ? 1.0 : 0.0;\n}}\n#endif\n",
       volume_count(),
-      volumes("uint(cluster)", "at.view", "at.light"));
+      volumes("at.view", "at.light"));
   source += fmt::format(
       "#ifdef CACHE_PIXELS\n"
       "void packed_cached(vec2 uv, {}) {{\n{}"
-      "  for (int v = 0; v < {}; ++v) eigen[v] = cached_eigen(int(cluster), v);\n{}}}\n#endif\n",
+      "  for (int v = 0; v < {}; ++v)\n"
+      "    eigen[v] = cached_eigen(int(v < {} ? cluster.x : cluster.y), v);\n{}}}\n#endif\n",
       results,
       fetch,
       volume_count(),
+      first_volumes(),
       mix);
 
   ModelShader shader;
   shader.source = std::move(source);
   shader.textures.push_back(pack_texels(colours));
   for (int v = 0; v < volume_count(); ++v) shader.textures.push_back(volume_texture(v));
-  shader.fetches = texels.words() + product_volumes() + volume_count();
+  const int single = layout_.half_angle ? volume_count() - first_volumes() : 0;
+  shader.fetches = texels.words() + 2 * volume_count() - single;
   shader.cache = EigenCache{
       .clusters = factors_.clusters, .layers = volume_count(), .texel_fetches = texels.words()};
   return shader;

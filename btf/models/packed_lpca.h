@@ -18,7 +18,8 @@ namespace veneer::btf {
 /// What models of two terms (scalar times colour) have in common. Immutable and thread-safe.
 ///
 /// The second function may be one of the half angle instead (half_angle.h), in volumes of its own:
-/// one fetch for four components, and a fortieth of the bytes.
+/// one fetch for four components, and a fortieth of the bytes. And it may have clusters of its own,
+/// as many, which are then fetched apart.
 ///
 /// Sources: Schneider 2004, "Real-time BTF Rendering", section 6.2 (two fetches, the fourth
 /// coordinate mixed by hand); Mueller et al. 2003 (clusters).
@@ -34,6 +35,7 @@ class PackedLpca {
     int angular = 16;
     DirectionRole beyond = DirectionRole::kLight;
     int colours = 1;          ///< of a texel, 1 or 2
+    bool separate = false;    ///< each function has clusters of its own
     bool half_angle = false;  ///< of the second function; fit() leaves that to with_half_angle()
   };
 
@@ -54,22 +56,24 @@ class PackedLpca {
   [[nodiscard]] static Result<PackedLpca> load(const SafetensorsFile& file,
                                                DirectionRole beyond,
                                                int colours,
+                                               bool separate = false,
                                                bool half_angle = false);
   void add_to(Material::Contents& contents) const;
 
   [[nodiscard]] const MaterialFrame& frame() const { return frame_; }
+  [[nodiscard]] bool has_separate_clusters() const { return layout_.separate; }
   [[nodiscard]] bool has_half_angle() const { return layout_.half_angle; }
   [[nodiscard]] const Components& components() const { return layout_.components; }
   /// The same with the nearest second function of the half angle: its Eigen-BRDFs are taken there,
   /// and its weights found anew.
   /// @param read, ranks  as fit() had them.
   [[nodiscard]] PackedLpca with_half_angle(const Read& read, Communicator& ranks) const;
-  /// How far the second function of texels evenly chosen is from what `read` gives, as drawn at
-  /// the measured pairs: root mean square.
-  [[nodiscard]] double second_rmse(const Read& read) const;
+  /// How far each function of texels evenly chosen is from what `read` gives, as drawn at the
+  /// measured pairs: root mean square.
+  [[nodiscard]] Eigen::Vector2d rmse(const Read& read) const;
   /// As Material::values_per_texel(), without colours.
   [[nodiscard]] double values_per_texel() const {
-    return factors_.values_per_texel(frame_.texel_count());
+    return factors_.values_per_texel(frame_.texel_count()) + (layout_.separate ? 1.0 : 0.0);
   }
   /// Both functions of a texel at every measured pair, from the factors.
   void reconstruct(int texel, std::span<float> first, std::span<float> second) const;
@@ -87,17 +91,23 @@ class PackedLpca {
   [[nodiscard]] ModelShader shader(std::span<const Eigen::half> colours) const;
 
  private:
-  PackedLpca(MaterialFrame frame, Layout layout, LpcaFactors factors);
+  // @param second_cluster  [texel] where they are separate
+  PackedLpca(MaterialFrame frame,
+             Layout layout,
+             LpcaFactors factors,
+             std::vector<std::uint8_t> second_cluster);
   // Where a component stands: which volume, and which of its four channels.
   struct Slot {
     std::size_t volume;
     std::size_t channel;
   };
   [[nodiscard]] Slot slot(int component) const;
-  // Volumes over view and light; those of the half angle come behind them.
-  [[nodiscard]] int product_volumes() const;
-  [[nodiscard]] int product_components() const;
+  // Whether the second function has volumes of its own, behind those of the first.
+  [[nodiscard]] bool is_split() const { return layout_.separate || layout_.half_angle; }
+  [[nodiscard]] int first_volumes() const;
   [[nodiscard]] int volume_count() const;
+  // Of the first function and of the second.
+  [[nodiscard]] std::array<int, 2> clusters_of(int texel) const;
   [[nodiscard]] ModelTexture pack_texels(std::span<const Eigen::half> colours) const;
   [[nodiscard]] ModelTexture volume_texture(int volume) const;
   void fill_volumes();
@@ -107,6 +117,7 @@ class PackedLpca {
   MaterialFrame frame_;
   Layout layout_;
   LpcaFactors factors_;
+  std::vector<std::uint8_t> second_cluster_;  // [texel], empty where both functions share
   AngularGrid views_;
   AngularGrid lights_;
   ClusterVolume place_;

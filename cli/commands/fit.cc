@@ -79,6 +79,9 @@ Result<int> run_fit(CommandLine& line) {
   app.add_option("--specular",
                  options.specular,
                  "How dichromatic-lpca keeps its specular term: product, half-angle, measured");
+  app.add_option("--clustering",
+                 options.clustering,
+                 "Clusters of dichromatic-lpca's two terms: joint, separate, measured");
   app.add_option("--precision", options.precision, "8bit or float16, for models that offer both");
   app.add_option("--angular", options.angular, "Nodes along each side of the direction square")
       ->capture_default_str();

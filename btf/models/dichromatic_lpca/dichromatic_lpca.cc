@@ -19,6 +19,8 @@ constexpr std::string_view kRatio = "ratio";
 constexpr std::string_view kSubtractive = "subtractive";
 constexpr std::string_view kProduct = "product";
 constexpr std::string_view kHalfAngle = "half-angle";
+constexpr std::string_view kJoint = "joint";
+constexpr std::string_view kSeparate = "separate";
 constexpr std::string_view kMeasured = "measured";
 constexpr int kColours = 1;  // of a texel in the shader
 
@@ -29,6 +31,9 @@ constexpr double kLeastCosine = 1e-6;
 // "measured" keeps the half angle while its error of the specular term is at most so many times
 // that of the product: a difference that nobody sees.
 constexpr double kHalfAngleServes = 1.05;
+// "measured" keeps separate clusters where both terms' error is under this share of the joint
+// ones': they cost fetches.
+constexpr double kSeparateServes = 0.9;
 
 constexpr char kSpecularWeightGlsl[] =
 #include "btf/models/specular_weight.glsl.inc"
@@ -69,23 +74,31 @@ Status check_form(std::string_view form, Errc code, std::string_view doing) {
               kSubtractive);
 }
 
-Status check_specular(const FitOptions& options, std::string_view form) {
-  const std::string& specular = options.specular;
-  if (!specular.empty() && specular != kProduct && specular != kHalfAngle && specular != kMeasured)
+// One of three names, or none.
+Status check_choice(std::string_view option,
+                    std::string_view value,
+                    std::string_view first,
+                    std::string_view second) {
+  if (value.empty() || value == first || value == second || value == kMeasured) return {};
+  return fail(Errc::kInvalidOption,
+              "fit: {} is \"{}\"; {} knows {}, {} and {}",
+              option,
+              value,
+              kName,
+              first,
+              second,
+              kMeasured);
+}
+
+Status check_choices(const FitOptions& options, std::string_view form) {
+  VENEER_TRY(check_choice("specular", options.specular, kProduct, kHalfAngle));
+  VENEER_TRY(check_choice("clustering", options.clustering, kJoint, kSeparate));
+  if (options.specular == kHalfAngle && form == kSubtractive)
     return fail(Errc::kInvalidOption,
-                "fit: specular is \"{}\"; {} knows {}, {} and {}",
-                specular,
-                kName,
-                kProduct,
+                "fit: a specular term over the {} has a cosine of its own, and form \"{}\" fades "
+                "all terms together; choose another form",
                 kHalfAngle,
-                kMeasured);
-  if (specular == kHalfAngle && form == kSubtractive)
-    return fail(
-        Errc::kInvalidOption,
-        "fit: a specular term over the {} has a cosine of its own, and form \"{}\" fades all "
-        "terms together; choose another form",
-        kHalfAngle,
-        kSubtractive);
+                kSubtractive);
   return {};
 }
 
@@ -190,6 +203,7 @@ class Dichromatic final : public Material {
     Contents contents;
     scalars_.add_to(contents);
     contents.metadata["form"] = terms_.form;
+    contents.metadata["clustering"] = scalars_.has_separate_clusters() ? kSeparate : kJoint;
     contents.metadata["specular"] = scalars_.has_half_angle() ? kHalfAngle : kProduct;
     contents.metadata["masked_texels"] = fmt::format("{}", terms_.masked_texels);
     contents.tensors.push_back(
@@ -288,8 +302,8 @@ bool serves(const PackedLpca& half_angle,
             const PackedLpca::Read& read,
             Progress& progress) {
   progress.start("specular term", 1);
-  const double with = half_angle.second_rmse(read);
-  const double without = product.second_rmse(read);
+  const double with = half_angle.rmse(read)[1];
+  const double without = product.rmse(read)[1];
   progress.finish(fmt::format("rmse {:.3g} over the half angle, {:.3g} without", with, without));
   return with <= kHalfAngleServes * without;
 }
@@ -305,7 +319,7 @@ Result<std::unique_ptr<Material>> fit_dichromatic_lpca(const SampleSet& set,
                 parse_two_terms(options.components, kName));
   const std::string form = options.form.empty() ? std::string(kLearned) : options.form;
   VENEER_TRY(check_form(form, Errc::kInvalidOption, "fit"));
-  VENEER_TRY(check_specular(options, form));
+  VENEER_TRY(check_choices(options, form));
   if (!set.info().polarised)
     return fail(
         Errc::kInvalidOption,
@@ -336,7 +350,17 @@ Result<std::unique_ptr<Material>> fit_dichromatic_lpca(const SampleSet& set,
     set.rgb(texel, Part::kSpecular, rgb);
     Eigen::Map<Eigen::VectorXf>(specular.data(), samples.rows()) = samples * terms.specular_colour;
   };
-  VENEER_ASSIGN(PackedLpca scalars, PackedLpca::fit(frame, options, layout, read, progress));
+  const auto fit_scalars = [&](bool separate) {
+    PackedLpca::Layout own = layout;
+    own.separate = separate;
+    return PackedLpca::fit(frame, options, own, read, progress);
+  };
+  VENEER_ASSIGN(PackedLpca scalars, fit_scalars(options.clustering == kSeparate));
+  if (options.clustering == kMeasured) {
+    VENEER_ASSIGN(PackedLpca separate, fit_scalars(true));
+    if (separate.rmse(read).norm() < kSeparateServes * scalars.rmse(read).norm())
+      scalars = std::move(separate);
+  }
   const bool measured = options.specular == kMeasured && !terms.subtractive;
   if (measured || options.specular == kHalfAngle) {
     PackedLpca half_angle = scalars.with_half_angle(read, *options.ranks);
@@ -349,7 +373,7 @@ Result<std::unique_ptr<Material>> load_dichromatic_lpca(const SafetensorsFile& f
   VENEER_ASSIGN(const std::string form, file.meta("form"));
   VENEER_TRY(check_form(form, Errc::kBadFormat, fmt::format("reading {}", file.path().string())));
   Terms terms = Terms::of(form);
-  // Files from before there was a choice hold products.
+  // Files from before there was a choice hold products in joint clusters.
   const std::string specular = file.meta("specular").value_or(std::string(kProduct));
   if (specular != kProduct && (specular != kHalfAngle || terms.subtractive))
     return fail(Errc::kBadFormat,
@@ -361,9 +385,21 @@ Result<std::unique_ptr<Material>> load_dichromatic_lpca(const SafetensorsFile& f
                 kProduct,
                 kHalfAngle,
                 kSubtractive);
-  VENEER_ASSIGN(
-      PackedLpca scalars,
-      PackedLpca::load(file, beyond(terms.subtractive), kColours, specular == kHalfAngle));
+  const std::string clustering = file.meta("clustering").value_or(std::string(kJoint));
+  if (clustering != kJoint && clustering != kSeparate)
+    return fail(Errc::kBadFormat,
+                "reading {}: clustering is \"{}\"; {} knows {} and {}",
+                file.path().string(),
+                clustering,
+                kName,
+                kJoint,
+                kSeparate);
+  VENEER_ASSIGN(PackedLpca scalars,
+                PackedLpca::load(file,
+                                 beyond(terms.subtractive),
+                                 kColours,
+                                 clustering == kSeparate,
+                                 specular == kHalfAngle));
   const int texels = scalars.frame().texel_count();
   VENEER_ASSIGN(terms.masked_texels, read_integer(file, "masked_texels", 0, texels));
   for (const auto& [name, colour] : {std::pair{"specular_colour", &terms.specular_colour},

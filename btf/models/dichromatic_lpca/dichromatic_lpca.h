@@ -25,6 +25,10 @@ namespace veneer::btf {
 /// keeps it where its error of the specular term is at most 5 % above the product's. Not with form
 /// "subtractive".
 ///
+/// The two terms may have clusters of their own (FitOptions::clustering), as many each: a texel
+/// then has two indices, and the terms no volume in common. "measured" keeps them where the error
+/// of both terms is under nine tenths of the joint ones'.
+///
 /// Texels whose D_ref (the root mean square of D, where learned) is under the noise have no colour
 /// to scale: their diffuse part is drawn as 0, and metadata "masked_texels" says how many they are.
 ///

@@ -8,7 +8,8 @@
 #include "btf/internal_thread_ranks.h"
 #include "btf/models/internal_test_models.h"
 
-// The specular term over the half angle; what holds for all forms is in models_test.cc.
+// The specular term over the half angle, and terms with clusters of their own; what holds for all
+// forms is in models_test.cc.
 namespace veneer::btf {
 namespace {
 
@@ -232,6 +233,103 @@ TEST_F(HalfAngleSpecular, WhatCannotBeIsRefused) {
     ASSERT_FALSE(refused) << model.name;
     EXPECT_EQ(refused.error().code, Errc::kInvalidOption);
   }
+}
+
+// Shading and gloss of two kinds each, in all four pairings: two clusters tell both kinds of each
+// term only where the terms have clusters of their own.
+SampleSet crossed_set(const std::filesystem::path& folder, bool crossed) {
+  SampleSetInfo info = testing::small_info(true);
+  info.width = info.height = 4;
+  return make_set(folder, info, [info, crossed](int texel, int view, int light, int channel) {
+    const int kind = texel % 2;
+    const bool other = crossed ? texel / 2 % 2 == 0 : kind == 0;
+    const Direction& l = info.lights[static_cast<std::size_t>(light)];
+    const Direction& v = info.views[static_cast<std::size_t>(view)];
+    if (channel >= 3)
+      return static_cast<float>(0.5 * l.z() * (kind == 0 ? 1.0 : 1.0 - 0.8 * v.z()));
+    const Direction half = (v + l).normalized();
+    return static_cast<float>(0.4 * l.z() * std::pow(half.z(), other ? 4.0 : 40.0));
+  });
+}
+
+class SeparateClusters : public ::testing::Test {
+ protected:
+  [[nodiscard]] static FitOptions options_of(std::string clustering, std::string specular = "") {
+    FitOptions options = options_with("1+1", 2);
+    options.clustering = std::move(clustering);
+    options.specular = std::move(specular);
+    return options;
+  }
+  static std::string kept(const Material& m) { return m.contents().metadata.at("clustering"); }
+  TemporaryFolder folder_;
+  SampleSet crossed_ = crossed_set(folder_.path() / "crossed.btfset", true);
+  SampleSet together_ = crossed_set(folder_.path() / "together.btfset", false);
+};
+
+TEST_F(SeparateClusters, TellApartWhatJointOnesMix) {
+  const auto separate = fit(kModel, crossed_, options_of("separate"));
+  const auto joint = fit(kModel, crossed_, options_of("joint"));
+  ASSERT_TRUE(separate && joint);
+  EXPECT_LT(largest_error(crossed_, **separate), kHalfTolerance);
+  EXPECT_GT(largest_error(crossed_, **joint), 10 * kHalfTolerance);
+  EXPECT_EQ((*separate)->values_per_texel(), (*joint)->values_per_texel() + 1);
+  EXPECT_GT((*separate)->shader().fetches, (*joint)->shader().fetches);
+  // With the half angle there is no fetch more: the terms are fetched apart in any case.
+  const auto half = fit(kModel, crossed_, options_of("joint", "half-angle"));
+  const auto both = fit(kModel, crossed_, options_of("separate", "half-angle"));
+  ASSERT_TRUE(half && both);
+  EXPECT_EQ((*both)->shader().fetches, (*half)->shader().fetches);
+  EXPECT_LT(largest_error(crossed_, **both), 4 * kHalfTolerance);  // and the grid of half angles
+}
+
+TEST_F(SeparateClusters, MeasuringKeepsThemWhereTheyGain) {
+  const auto crossed = fit(kModel, crossed_, options_of("measured"));
+  const auto together = fit(kModel, together_, options_of("measured"));
+  ASSERT_TRUE(crossed && together);
+  EXPECT_EQ(kept(**crossed), "separate");
+  EXPECT_EQ(kept(**together), "joint");
+}
+
+TEST_F(SeparateClusters, AreTheSameAfterSavingAndLoading) {
+  Pcg32 random(5);
+  for (const char* specular : {"product", "half-angle"}) {
+    const auto material = fit(kModel, crossed_, options_of("separate", specular));
+    ASSERT_TRUE(material);
+    const auto path = folder_.path() / "m.safetensors";
+    ASSERT_TRUE(save_material(**material, path, {}));
+    const auto loaded = load_material(path);
+    ASSERT_TRUE(loaded) << loaded.error().what;
+    EXPECT_EQ(kept(**loaded), "separate");
+    for (int i = 0; i < 50; ++i) {
+      const Direction view = random_direction(random, -0.2);
+      const Direction light = random_direction(random, -0.2);
+      EXPECT_EQ((*material)->radiance(i % 16, view, light),
+                (*loaded)->radiance(i % 16, view, light));
+    }
+  }
+}
+
+TEST_F(SeparateClusters, OtherWordsAndOtherModelsAreRefused) {
+  EXPECT_EQ(fit(kModel, crossed_, options_of("apart")).error().code, Errc::kInvalidOption);
+  for (const Model& model : models()) {
+    if (model.name == kModel) continue;
+    const auto refused = fit(model.name, crossed_, options_of("separate"));
+    ASSERT_FALSE(refused) << model.name;
+    EXPECT_EQ(refused.error().code, Errc::kInvalidOption);
+  }
+}
+
+// One texel, and more clusters than texels.
+TEST_F(SeparateClusters, FitASingleTexel) {
+  SampleSetInfo info = testing::small_info(true);
+  info.width = info.height = 1;
+  const SampleSet one =
+      make_set(folder_.path() / "one.btfset", info, [](int, int, int, int channel) {
+        return channel < 3 ? 0.1F : 0.3F;
+      });
+  const auto material = fit(kModel, one, options_of("separate"));
+  ASSERT_TRUE(material) << material.error().what;
+  EXPECT_LT(largest_error(one, **material), kHalfTolerance);
 }
 
 }  // namespace
