@@ -60,6 +60,26 @@ class ProgramsTest : public testing::Test {
   static inline TemporaryFolder* folder_ = nullptr;
 };
 
+// A measured view, one between measured ones, a light, and what there is no data for.
+TEST_F(ProgramsTest, FitsForOneViewOrOneLight) {
+  const std::string fit = "veneer fit " + text("cloth.btfset") +
+                          " --model texel-colours --components 1+1 --clusters 2 --angular 8 -o " +
+                          text("fixed.safetensors");
+  for (const char* fixed : {" --fixed-view 0,0", " --fixed-view 7.5,100", " --fixed-light 20,45"}) {
+    const Outcome outcome = run(fit + fixed);
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    ASSERT_TRUE(fs::exists(at("fixed.safetensors")));
+    EXPECT_LT(fs::file_size(at("fixed.safetensors")),
+              fs::file_size(at("material.safetensors")) / 4);
+    fs::remove(at("fixed.safetensors"));
+  }
+  EXPECT_TRUE(fails(run(fit + " --fixed-view 89,0"), 2, "beyond its measured views"));
+  EXPECT_TRUE(fails(run(fit + " --fixed-light nan,0"), 2, "not a direction"));
+  EXPECT_TRUE(fails(run(fit + " --fixed-view 10"), 2, "--fixed-view"));
+  for (const auto& entry : fs::directory_iterator(folder_->path()))
+    EXPECT_EQ(entry.path().filename().string().find("fixed"), std::string::npos) << entry.path();
+}
+
 TEST_F(ProgramsTest, UnknownCommandsAndOptionsAreWrongUsage) {
   EXPECT_TRUE(fails(run("veneer"), 2, "usage"));
   EXPECT_TRUE(fails(run("veneer paint"), 2, "no command \"paint\""));

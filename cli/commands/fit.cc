@@ -2,8 +2,13 @@
 #include <nlohmann/json.hpp>
 
 #include <chrono>
+#include <numbers>
+#include <optional>
+#include <vector>
 
 #include "base/exit_code.h"
+#include "base/files.h"
+#include "btf/fixed_directions.h"
 #include "btf/material.h"
 #include "cli/commands/commands.h"
 #include "cli/ranks/ranks.h"
@@ -15,7 +20,11 @@ struct FitRequest {
   std::filesystem::path set;
   std::filesystem::path out;
   std::string model;
+  std::vector<double> fixed_view;   // theta and phi in degrees, or none
+  std::vector<double> fixed_light;  // theta and phi in degrees, or none
   btf::FitOptions options;
+
+  [[nodiscard]] bool is_fixed() const { return !fixed_view.empty() || !fixed_light.empty(); }
 };
 
 struct FitReport {
@@ -23,6 +32,32 @@ struct FitReport {
   std::size_t gpu_bytes = 0;
   int fetches = 0;
 };
+
+std::optional<btf::Direction> direction_of(const std::vector<double>& degrees) {
+  if (degrees.empty()) return std::nullopt;
+  constexpr double kDegree = std::numbers::pi / 180.0;
+  return btf::direction_from_angles({degrees[0] * kDegree, degrees[1] * kDegree});
+}
+
+// The set that is fitted, and the folder that holds it for as long where it had to be made.
+struct FittedSet {
+  std::optional<StagedFolder> folder;
+  btf::SampleSet set;
+};
+
+Result<FittedSet> open_set(const FitRequest& request, Progress& progress) {
+  VENEER_ASSIGN(btf::SampleSet set, btf::SampleSet::open(request.set));
+  if (!request.is_fixed()) return FittedSet{std::nullopt, std::move(set)};
+  // Beside the material, where there is room and a leftover of a dead process is found.
+  VENEER_ASSIGN(StagedFolder folder, StagedFolder::create(request.out.string() + ".btfset"));
+  VENEER_ASSIGN(
+      btf::SampleSet fixed,
+      btf::fix_directions(set,
+                          {direction_of(request.fixed_view), direction_of(request.fixed_light)},
+                          folder.path() / "fixed.btfset",
+                          progress));
+  return FittedSet{std::move(folder), std::move(fixed)};
+}
 
 // What every rank does; rank 0 writes the material.
 Result<FitReport> fit(const FitRequest& request, btf::Communicator& ranks, Progress& progress) {
@@ -33,18 +68,24 @@ Result<FitReport> fit(const FitRequest& request, btf::Communicator& ranks, Progr
         "fit: {} is not shared among processes, of which there are {}; run it without mpirun",
         request.model,
         ranks.size());
-  const Result<btf::SampleSet> set = btf::SampleSet::open(request.set);
-  VENEER_TRY(btf::agree(ranks, set ? Status() : tl::unexpected(set.error())));
+  if (ranks.size() > 1 && request.is_fixed())
+    return fail(Errc::kInvalidOption,
+                "fit: a fixed view or light is not shared among processes, of which there are {}; "
+                "run it without mpirun",
+                ranks.size());
+  const Result<FittedSet> opened = open_set(request, progress);
+  VENEER_TRY(btf::agree(ranks, opened ? Status() : tl::unexpected(opened.error())));
+  const btf::SampleSet& set = opened->set;
   const auto begin = std::chrono::steady_clock::now();
   VENEER_ASSIGN(const std::unique_ptr<btf::Material> material,
-                model->fit(*set, request.options, progress));
+                model->fit(set, request.options, progress));
   FitReport report;
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   Status saved;
   if (ranks.rank() == 0) {
     saved = btf::save_material(*material,
                                request.out,
-                               {{"fitted_on", set->info().source},
+                               {{"fitted_on", set.info().source},
                                 {"clusters", std::to_string(request.options.clusters)},
                                 {"components", request.options.components},
                                 {"seed", std::to_string(request.options.seed)}});
@@ -87,6 +128,16 @@ Result<int> run_fit(CommandLine& line) {
       ->capture_default_str();
   app.add_option("--iterations", options.iterations, "Rounds of clustering at most")
       ->capture_default_str();
+  app.add_option("--fixed-view",
+                 request.fixed_view,
+                 "theta,phi in degrees: fit for this view alone, which drops two dimensions")
+      ->delimiter(',')
+      ->expected(2);
+  app.add_option("--fixed-light",
+                 request.fixed_light,
+                 "theta,phi in degrees: fit for a light from there alone")
+      ->delimiter(',')
+      ->expected(2);
   app.add_option("--seed", options.seed, "Seed of everything random")->capture_default_str();
   line.parse();
 
