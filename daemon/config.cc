@@ -64,6 +64,9 @@ Result<Config> Config::read(TomlReader& toml) {
   if (const Status status = config.prediction.check(); !status) {
     toml.add_error("prediction", status.error().what);
   }
+  // A rehearsal's own tables (veneer harness): the same file is the daemon's configuration.
+  toml.table("scenario").ignore_the_rest();
+  for (TomlReader& expectation : toml.tables("expect")) expectation.ignore_the_rest();
   TomlReader presence = toml.table("presence");
   config.presence = tracking::PresenceOptions::read(presence);
   TomlReader validation = toml.table("validation");

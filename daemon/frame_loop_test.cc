@@ -169,7 +169,7 @@ TEST_F(FrameLoopTest, CountsTheFramesItLosesInRealTime) {
   config_.frames = 5;
   SteadyClock clock;
   MovingTracker tracker(clock, clock.now(), clock.now() + 1h);
-  PoseFeed poses(tracker, clock, config_.clock, {0}, config_.prediction);
+  PoseFeed poses(tracker, clock, config_.clock, {0}, config_.prediction, config_.validation);
   SlowOutput output;
   FrameLoop loop(config_, scene_, {4, 3, 8}, clock, poses, renderer_, output);
   SilentProgress silent;

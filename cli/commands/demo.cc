@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nlohmann/json.hpp>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cstring>
 #include <system_error>
 
 #include "base/exit_code.h"
@@ -14,6 +10,7 @@
 #include "btf/sample_set.h"
 #include "cli/bench_profile.h"
 #include "cli/commands/commands.h"
+#include "cli/programs.h"
 #include "cli/report/report.h"
 #include "render/scene.h"
 #include "simulation/materials/synthesize.h"
@@ -36,41 +33,6 @@ struct DemoOptions {
   int frames = 120;
   btf::FitOptions fit;
 };
-
-fs::path program_folder() { return fs::read_symlink("/proc/self/exe").parent_path(); }
-
-/// build/bin/veneer lies two folders below the project.
-fs::path default_etc() { return (program_folder() / "../../etc").lexically_normal(); }
-
-/// Runs a program beside this one and waits for it. Errors: kIo with its exit code.
-Status run_program(const std::string& name, std::vector<std::string> arguments) {
-  const std::string path = (program_folder() / name).string();
-  arguments.insert(arguments.begin(), path);
-  std::vector<char*> argv;
-  argv.reserve(arguments.size() + 1);
-  for (std::string& argument : arguments) argv.push_back(argument.data());
-  argv.push_back(nullptr);
-  pid_t pid = 0;
-  if (const int error = ::posix_spawn(&pid, path.c_str(), nullptr, nullptr, argv.data(), environ);
-      error != 0) {
-    return fail(Errc::kIo, "starting {}: {}", path, std::strerror(error));
-  }
-  int status = 0;
-  while (::waitpid(pid, &status, 0) < 0) {
-    if (errno != EINTR) return fail(Errc::kIo, "waiting for {}: {}", path, std::strerror(errno));
-  }
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != kExitDone) {
-    return fail(Errc::kIo, "{} failed; what it says above tells why", name);
-  }
-  return {};
-}
-
-/// Whether `file` was made after this program was built: what an older one made may differ.
-bool is_up_to_date(const fs::path& file) {
-  std::error_code error;
-  const auto made = fs::last_write_time(file, error);
-  return !error && made > fs::last_write_time("/proc/self/exe");
-}
 
 /// The sample set that the demo shows: the user's, or cloth that is path-traced at the first run.
 Result<fs::path> sample_set(const DemoOptions& options, Progress& progress) {

@@ -271,10 +271,10 @@ void DeviceTracker::take_bytes(std::span<const std::byte> bytes, Time arrival) {
 }
 
 void DeviceTracker::take_sample(const RawSample& raw, Time arrival) {
-  newest_sample_ = std::max(newest_sample_, arrival);
   Sensor& sensor = sensors_[raw.sensor];
   const std::optional<Time> time = time_of(raw, sensor, arrival);
   if (!time) return;
+  newest_sample_ = std::max(newest_sample_, arrival);
   const std::uint64_t passed = step_of(raw, sensor);
   if (passed > 1) count([passed](TrackerCounters& counters) { counters.lost += passed - 1; });
   if (raw.sequence) {
