@@ -39,6 +39,22 @@ function(veneer_add_test name)
   endif()
 endfunction()
 
+# veneer_add_bus_test(NAME SRCS ... [DEPS ...])
+#
+# As veneer_add_test, for a program whose USB and HID devices are mocked (tracking/testing/).
+# umockdev's library must be the first to be loaded and GLib keeps what it once allocated, so that
+# the address sanitizer is told to mind neither.
+function(veneer_add_bus_test name)
+  cmake_parse_arguments(B "" "" "SRCS;DEPS" ${ARGN})
+  add_executable(veneer_${name}_test ${B_SRCS})
+  target_link_libraries(veneer_${name}_test PRIVATE ${B_DEPS} veneer_mock_bus)
+  add_dependencies(veneer_tests veneer_${name}_test)
+  add_test(NAME ${name} COMMAND ${UMOCKDEV_WRAPPER} $<TARGET_FILE:veneer_${name}_test>)
+  set_tests_properties(${name} PROPERTIES
+    SKIP_RETURN_CODE 77
+    ENVIRONMENT "GTEST_OUTPUT=xml:${CMAKE_BINARY_DIR}/test-results/${name}.xml;ASAN_OPTIONS=verify_asan_link_order=0:detect_leaks=0")
+endfunction()
+
 # veneer_uses_gl(RESULT DEPS...): whether one of DEPS is GL itself or a module that uses it.
 function(veneer_uses_gl result)
   set(${result} FALSE PARENT_SCOPE)

@@ -6,6 +6,9 @@
 #include <string>
 
 #include "tracking/drivers/freed/freed_tracker.h"
+#include "tracking/drivers/osvr_hdk/osvr_hdk.h"
+#include "tracking/drivers/polhemus/polhemus.h"
+#include "tracking/drivers/razer_hydra/razer_hydra.h"
 #include "tracking/drivers/replay/replay_tracker.h"
 #include "tracking/drivers/simulated/simulated_tracker.h"
 #include "tracking/drivers/simulated_device/simulated_device.h"
@@ -21,6 +24,9 @@ Result<std::unique_ptr<Tracker>> open_as_tracker(TomlReader& config, Clock& cloc
 
 constexpr std::array kDrivers{
     Driver{"freed", "camera trackers and robotic heads that send FreeD by UDP", &open_freed},
+    Driver{"osvr-hdk", "OSVR HDK: where a head looks", &open_osvr_hdk},
+    Driver{"polhemus", "Polhemus LIBERTY or PATRIOT, over USB", &open_polhemus},
+    Driver{"razer-hydra", "Razer Hydra: two controllers", &open_razer_hydra},
     Driver{"replay", "a recording, at its own pace", &open_as_tracker<ReplayTracker>},
     Driver{"simulated", "bodies on scripted paths", &open_as_tracker<SimulatedTracker>},
     Driver{"simulated-device",
