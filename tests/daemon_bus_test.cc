@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: Apache-2.0
+// The daemon as it is, with a tracker on a mocked USB bus that goes wrong in every way.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <spawn.h>
+#include <sys/wait.h>
+
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <functional>
+#include <sstream>
+#include <string>
+#include <thread>
+
+#include "base/files.h"
+#include "base/random.h"
+#include "base/testing/temporary_folder.h"
+#include "tracking/testing/mock_liberty.h"
+
+namespace veneer {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using ::testing::HasSubstr;
+using tracking::mock::Liberty;
+using tracking::mock::UsbDevice;
+
+/// Waits until `done`; false if that takes too long.
+bool wait_until(const std::function<bool()>& done, seconds patience = seconds(30)) {
+  const auto give_up = std::chrono::steady_clock::now() + patience;
+  while (!done()) {
+    if (std::chrono::steady_clock::now() > give_up) return false;
+    std::this_thread::sleep_for(milliseconds(5));
+  }
+  return true;
+}
+
+std::size_t count_entries(const fs::path& folder) {
+  return static_cast<std::size_t>(
+      std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
+}
+
+/// veneerd as a child; killed when it goes out of sight.
+class Daemon {
+ public:
+  Daemon(const std::vector<std::string>& arguments, fs::path log) : log_(std::move(log)) {
+    std::vector<std::string> words{VENEER_PROGRAMS "/veneerd"};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    std::vector<char*> argv;
+    for (std::string& word : words) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    posix_spawn_file_actions_t actions;
+    ::posix_spawn_file_actions_init(&actions);
+    constexpr int kMode = 0644;
+    ::posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+    ::posix_spawn_file_actions_addopen(
+        &actions, 2, log_.c_str(), O_WRONLY | O_CREAT | O_TRUNC, kMode);
+    if (::posix_spawn(&pid_, argv[0], &actions, nullptr, argv.data(), environ) != 0) pid_ = -1;
+    ::posix_spawn_file_actions_destroy(&actions);
+  }
+  ~Daemon() {
+    if (pid_ <= 0) return;
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+  }
+  Daemon(const Daemon&) = delete;
+  Daemon& operator=(const Daemon&) = delete;
+
+  [[nodiscard]] bool runs() const { return pid_ > 0 && ::waitpid(pid_, nullptr, WNOHANG) == 0; }
+  /// Ends it as a person does; its exit code, or -1.
+  [[nodiscard]] int stop() {
+    ::kill(pid_, SIGTERM);
+    int status = 0;
+    const bool ended = wait_until([&] { return ::waitpid(pid_, &status, WNOHANG) == pid_; });
+    if (!ended) return -1;
+    pid_ = -1;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  [[nodiscard]] std::string log() const { return read_text(log_).value_or(""); }
+  [[nodiscard]] std::size_t descriptors() const { return count_entries(proc() / "fd"); }
+  [[nodiscard]] std::size_t threads() const { return count_entries(proc() / "task"); }
+  [[nodiscard]] double resident_mib() const {
+    const std::string status = read_text(proc() / "status").value_or("");
+    const std::size_t at = status.find("VmRSS:");
+    return at == std::string::npos ? 0 : std::stod(status.substr(at + 6)) / 1024;
+  }
+
+ private:
+  [[nodiscard]] fs::path proc() const { return fs::path("/proc") / std::to_string(pid_); }
+  fs::path log_;
+  pid_t pid_ = -1;
+};
+
+/// After the last fault; a few frames, however busy the machine.
+constexpr milliseconds kRecovery(3000);
+/// The latency of the display, and a frame or two of a software renderer.
+constexpr double kFreshPose_ms = 500;
+
+class DaemonOnTheBus : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder;
+    const std::string here = folder_->path().string();
+    const std::string etc = VENEER_ETC;
+    for (const std::string& line :
+         {"synthesize cloth --size 8 --views 25 --lights 25 --samples 1 -o " + here + "/s.btfset",
+          "fit " + here + "/s.btfset --model phong -o " + here + "/material.safetensors",
+          "calibrate --bench " + etc + "/benches/demo.toml -o " + here + "/profile"}) {
+      ASSERT_EQ(std::system((VENEER_PROGRAMS "/veneer " + line + " --quiet </dev/null").c_str()), 0)
+          << line;
+    }
+    std::string scene = read_text(fs::path(etc) / "demo" / "scene.toml").value();
+    const std::string body = "tracker_body = 0";
+    ASSERT_NE(scene.find(body), std::string::npos);
+    scene.replace(scene.find(body), body.size(), "tracker_body = 1");
+    ASSERT_TRUE(write_text(folder_->path() / "scene.toml", scene));
+    ASSERT_TRUE(write_text(folder_->path() / "veneer.toml",
+                           read_text(fs::path(etc) / "demo" / "veneer.toml").value()));
+  }
+  static void TearDownTestSuite() {
+    delete folder_;
+    folder_ = nullptr;
+  }
+
+  /// Station 1 of a LIBERTY is the observer; few frames, since pictures are not what is looked at.
+  static std::vector<std::string> arguments() {
+    std::vector<std::string> result{"--config", (folder_->path() / "veneer.toml").string()};
+    for (const std::string& setting : {std::string("clock=\"monotonic\""),
+                                       std::string("frames=0"),
+                                       std::string("frame_rate_hz=5"),
+                                       std::string("first_pose_timeout_s=60"),
+                                       "frame_log=\"" + frame_log().string() + "\"",
+                                       std::string("tracker={driver=\"polhemus\"}"),
+                                       std::string("output={driver=\"null\"}")}) {
+      result.insert(result.end(), {"--set", setting});
+    }
+    return result;
+  }
+  static fs::path log_file() { return folder_->path() / "veneerd.log"; }
+  static fs::path frame_log() { return folder_->path() / "frames.csv"; }
+  /// How old the pose was that the last frame was made for, in milliseconds.
+  static double last_pose_age_ms() {
+    const std::string log = read_text(frame_log()).value_or("");
+    std::istringstream last_line(log.substr(log.rfind('\n', log.size() - 2) + 1));
+    std::string column;  // frame, display_time_ns, frame_ms, gpu_ms, pose_age_ms
+    for (int i = 0; i < 5; ++i) std::getline(last_line, column, ',');
+    return std::stod(column);
+  }
+
+  static inline TemporaryFolder* folder_ = nullptr;
+};
+
+/// Whether frames flow from the device to the daemon, now.
+bool flows(Liberty& liberty) {
+  const std::uint64_t before = liberty.frames();
+  return wait_until([&] {
+    return liberty.streams() && liberty.frames() > before + 20 && liberty.usb().in_flight() > 0;
+  });
+}
+
+TEST_F(DaemonOnTheBus, SurvivesUnplugReplugAndAnotherDevicesArrivalAndSaysSo) {
+  Liberty liberty;
+  {
+    Daemon daemon(arguments(), log_file());
+    ASSERT_TRUE(daemon.runs());
+    liberty.plug();
+    ASSERT_TRUE(flows(liberty)) << daemon.log();
+    const std::size_t descriptors = daemon.descriptors();
+    const std::size_t threads = daemon.threads();
+    UsbDevice mouse({0x046d, 0xc077, "Mouse", "", "1-4", {{0x81, true}}});
+    for (int i = 0; i < 5; ++i) {
+      liberty.unplug();
+      mouse.plug();
+      std::this_thread::sleep_for(milliseconds(50 * i));
+      EXPECT_TRUE(daemon.runs());
+      mouse.unplug();
+      liberty.plug();
+      ASSERT_TRUE(flows(liberty)) << daemon.log();
+    }
+    EXPECT_EQ(daemon.descriptors(), descriptors);
+    EXPECT_EQ(daemon.threads(), threads);
+    std::this_thread::sleep_for(kRecovery);
+    EXPECT_EQ(daemon.stop(), 0) << daemon.log();
+    EXPECT_LE(last_pose_age_ms(), kFreshPose_ms);
+    EXPECT_THAT(daemon.log(), HasSubstr("absent"));
+    EXPECT_THAT(daemon.log(), HasSubstr("tracking"));
+  }
+}
+
+TEST_F(DaemonOnTheBus, SurvivesTenThousandFaultsWithoutALeak) {
+  constexpr int kFaults = 10'000;
+  constexpr int kWarmUp = 1'000;  // what grows once, has grown then
+  constexpr double kGrowth_MiB = 8;
+  Liberty liberty;
+  {
+    Daemon daemon(arguments(), log_file());
+    liberty.plug();
+    ASSERT_TRUE(flows(liberty)) << daemon.log();
+    Pcg32 random(2026);
+    std::size_t descriptors = 0;
+    std::size_t threads = 0;
+    double resident_mib = 0;
+    for (int i = 0; i < kFaults; ++i) {
+      // A fault is one only while somebody listens.
+      ASSERT_TRUE(wait_until([&] { return liberty.usb().in_flight() > 0; }))
+          << "after fault " << i << "\n"
+          << daemon.log();
+      inject_random_fault(random, liberty);
+      std::this_thread::sleep_for(milliseconds(1));
+      if (i != kWarmUp) continue;
+      ASSERT_TRUE(flows(liberty)) << daemon.log();
+      descriptors = daemon.descriptors();
+      threads = daemon.threads();
+      resident_mib = daemon.resident_mib();
+    }
+    EXPECT_TRUE(flows(liberty)) << daemon.log();
+    EXPECT_EQ(daemon.descriptors(), descriptors);
+    EXPECT_EQ(daemon.threads(), threads);
+    EXPECT_LE(daemon.resident_mib(), resident_mib + kGrowth_MiB);
+    std::this_thread::sleep_for(kRecovery);
+    EXPECT_EQ(daemon.stop(), 0) << daemon.log();
+    EXPECT_LE(last_pose_age_ms(), kFreshPose_ms) << "nothing that was said falsely lasts";
+    EXPECT_THAT(daemon.log(), HasSubstr("absent"));
+  }
+}
+
+}  // namespace
+}  // namespace veneer
