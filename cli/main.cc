@@ -20,7 +20,7 @@ struct Command {
 };
 
 constexpr std::array kCommands{
-    Command{"bench", "Time what this machine does: bench render, bench fit", &cli::run_bench},
+    Command{"bench", "Time what this machine does: bench render, fit, query", &cli::run_bench},
     Command{"calibrate", "Measure a projector and write its profile", &cli::run_calibrate},
     Command{"compare",
             "Fit every model of the literature and print the published tables",
@@ -31,7 +31,8 @@ constexpr std::array kCommands{
     Command{"doctor", "Say what this machine offers and what is missing", &cli::run_doctor},
     Command{"evaluate", "Measure how well a material reproduces a sample set", &cli::run_evaluate},
     Command{"fit", "Fit a model to a sample set", &cli::run_fit},
-    Command{"harness", "Rehearse the daemon with a tracker that fails as planned", &cli::run_harness},
+    Command{
+        "harness", "Rehearse the daemon with a tracker that fails as planned", &cli::run_harness},
     Command{"import", "Bring measured data of another format to a sample set", &cli::run_import},
     Command{"render", "Draw one projector frame of a scene", &cli::run_render},
     Command{"synthesize", "Path-trace a material as a sample set", &cli::run_synthesize},

@@ -23,7 +23,6 @@ constexpr double kNothingLeft = 0.05;
 /// A query starts again when the writer has gone over the whole ring in the middle of it, which
 /// takes it 1024 samples; it does so at most this often.
 constexpr int kAttempts = 4;
-constexpr std::size_t kNumbers = 7;  // of a pose
 
 /// later - earlier in seconds, for any two times.
 double seconds_between(Time earlier, Time later) {
@@ -129,7 +128,9 @@ PoseTrack::Verdict PoseTrack::add(const PoseSample& sample) {
   rotation.coeffs() /= length;
   if (!first && rotation.dot(newest_.world_from_body.rotation) < 0) rotation.coeffs() *= -1;
   newest_ = taken;
-  publish({taken.time, taken.world_from_body, taken.epoch});
+  TimedPose pose{taken.time, taken.world_from_body, taken.epoch, {}};
+  pose.rates = fit_rates(pose, published_.load(std::memory_order_relaxed));
+  publish(pose);
   return Verdict::kTaken;
 }
 
@@ -142,7 +143,10 @@ void PoseTrack::publish(const TimedPose& pose) {
   const std::uint64_t index = published_.load(std::memory_order_relaxed);
   const Eigen::Vector3d& p = pose.world_from_body.translation;
   const Eigen::Quaterniond& q = pose.world_from_body.rotation;
-  const std::array<double, kNumbers> numbers{p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z()};
+  const Eigen::Vector3d& v = pose.rates.velocity;
+  const Eigen::Vector3d& w = pose.rates.angular_velocity;
+  const std::array<double, kNumbers> numbers{
+      p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z(), v.x(), v.y(), v.z(), w.x(), w.y(), w.z()};
 
   Slot& slot = slots_[index % kSlots];
   slot.stamp.store(2 * index + 1, std::memory_order_relaxed);
@@ -170,7 +174,8 @@ std::optional<PoseTrack::TimedPose> PoseTrack::read(std::uint64_t index) const {
   if (slot.stamp.load(std::memory_order_relaxed) != complete) return std::nullopt;
   return TimedPose{Time{Duration{ticks}},
                    {Eigen::Quaterniond(n[3], n[4], n[5], n[6]), Eigen::Vector3d(n[0], n[1], n[2])},
-                   epoch};
+                   epoch,
+                   {Eigen::Vector3d(n[7], n[8], n[9]), Eigen::Vector3d(n[10], n[11], n[12])}};
 }
 
 PoseEstimate PoseTrack::at(Time when) const {
@@ -179,8 +184,7 @@ PoseEstimate PoseTrack::at(Time when) const {
     if (published == 0) return {};
     const std::optional<TimedPose> newest = read(published - 1);
     if (!newest) continue;
-    return when < newest->time ? interpolate(when, *newest, published - 1)
-                               : predict(when, *newest, published - 1);
+    return when < newest->time ? interpolate(when, *newest, published - 1) : predict(when, *newest);
   }
   return {};
 }
@@ -218,14 +222,14 @@ PoseEstimate PoseTrack::interpolate(Time when, const TimedPose& newest, std::uin
   return estimate;
 }
 
-PoseEstimate PoseTrack::predict(Time when, const TimedPose& newest, std::uint64_t index) const {
+PoseEstimate PoseTrack::predict(Time when, const TimedPose& newest) const {
   const double ahead_s = seconds_between(newest.time, when);
   const double beyond_s = std::max(0.0, ahead_s - options_.horizon_s);
   // Velocities are v up to the horizon and v exp(-t / decay) beyond it; `travel_s` is the integral.
   const double left = std::exp(-beyond_s / options_.decay_s);
   const double travel_s = std::min(ahead_s, options_.horizon_s) -
                           options_.decay_s * std::expm1(-beyond_s / options_.decay_s);
-  const Rates rates = fit_rates(newest, index);
+  const Rates& rates = newest.rates;
 
   PoseEstimate estimate;
   estimate.age = clamped_difference(newest.time, when);

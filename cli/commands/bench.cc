@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/commands/bench_fit.h"
+#include "cli/commands/bench_query.h"
 #include "cli/commands/bench_render.h"
 #include "cli/commands/commands.h"
 
@@ -16,9 +17,9 @@ Result<int> run_bench(CommandLine& line) {
          "what",
          what,
          "render: what drawing a frame costs with each model; fit: what finding clusters in "
-         "a basis gains")
+         "a basis gains; query: what asking for a pose costs")
       ->required()
-      ->check(CLI::IsMember({"fit", "render"}));
+      ->check(CLI::IsMember({"fit", "query", "render"}));
   app.add_option("set",
                  set,
                  "The sample set, NAME.btfset; render takes a small synthetic one by itself, and "
@@ -45,6 +46,7 @@ Result<int> run_bench(CommandLine& line) {
     render.set = set;
     return bench_render(render, line);
   }
+  if (what == "query") return bench_query(line);
   if (set.empty()) return fail(Errc::kInvalidOption, "bench fit: name a sample set, NAME.btfset");
   VENEER_ASSIGN(const btf::Model* model, btf::find_model(model_name));
   return bench_fit(set, *model, fit, line);
