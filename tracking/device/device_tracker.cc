@@ -160,7 +160,7 @@ void DeviceTracker::initialise(Time deadline) {
     // What it says before it is told all is of no use, but has to be taken away.
     const Received received = transport_->read(buffer_, std::min(deadline, pause_until_));
     if (received.status != IoStatus::kOk && received.status != IoStatus::kTimeout) {
-      on_error(received.status);
+      on_error_while_starting(received.status, deadline);
     }
     return;
   }
@@ -369,6 +369,19 @@ void DeviceTracker::on_error(IoStatus status) {
     close(TrackerState::kFailed,
           fmt::format("{}: {}; it is opened again", port_->description(), text_of(status)));
   }
+}
+
+void DeviceTracker::on_error_while_starting(IoStatus status, Time deadline) {
+  if (status == IoStatus::kGone) {
+    on_error(status);
+    return;
+  }
+  // It costs nothing that was wanted; if it lasts, receive() will meet it. Opening again instead
+  // would meet it again, later and later. Nothing more is read in this pause, since a transfer may
+  // fail at once, for ever.
+  count([](TrackerCounters& counters) { ++counters.io_errors; });
+  if (status == IoStatus::kStall) static_cast<void>(transport_->clear_stall());
+  clock_.sleep_until(std::min(deadline, pause_until_));
 }
 
 void DeviceTracker::close(TrackerState state, std::string detail) {

@@ -78,6 +78,7 @@ class DeviceTracker final : public Tracker {
   /// How far its sequence number is from that of the sample before: 1 where there is none.
   [[nodiscard]] std::uint64_t step_of(const RawSample& raw, Sensor& sensor) const;
   void on_error(IoStatus status);
+  void on_error_while_starting(IoStatus status, Time deadline);
   /// Closes the device; it is opened again after a while, or when something is plugged in.
   void close(TrackerState state, std::string detail);
   void begin_epoch();

@@ -5,11 +5,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <string>
 #include <vector>
 
+#include "tracking/drivers/polhemus/polhemus_protocol.h"
 #include "tracking/drivers/simulated/path.h"
 #include "tracking/drivers/simulated_device/simulated_device.h"
 #include "tracking/pose_track.h"
@@ -320,6 +323,65 @@ TEST(DeviceTracker, ThreeErrorsInASecondOpenItAgainOneDoesNot) {
   EXPECT_GT(many.counters().opened, 1U);
   EXPECT_LT(many.counters().io_errors, 40U);
   EXPECT_EQ(many.status().state, TrackerState::kTracking);
+}
+
+/// A LIBERTY whose reads fail from the opening until it is told to send.
+class BadStart final : public Port {
+ public:
+  BadStart(IoStatus failure, Clock& clock) : failure_(failure), clock_(clock) {}
+  std::string description() const override { return "bad start"; }
+  Result<std::unique_ptr<Transport>> open() override {
+    sends_ = false;
+    return std::make_unique<Connection>(*this);
+  }
+  bool wait_for_arrival(Time deadline) override {
+    clock_.sleep_until(deadline);
+    return false;
+  }
+  [[nodiscard]] int failed_reads() const { return failed_reads_; }
+
+ private:
+  struct Connection final : Transport {
+    explicit Connection(BadStart& device) : port(device) {}
+    Received read(std::span<std::byte> buffer, Time deadline) override {
+      if (!port.sends_) {
+        ++port.failed_reads_;
+        return {port.failure_, 0, port.clock_.now()};
+      }
+      const Time next = port.clock_.now() + from_seconds(kFrame_s);
+      port.clock_.sleep_until(std::min(next, deadline));
+      if (next > deadline) return {IoStatus::kTimeout, 0, deadline};
+      PolhemusFrame frame;
+      frame.count = ++port.count_;
+      std::ranges::copy(encode(frame, PolhemusModel::kLiberty), buffer.begin());
+      return {IoStatus::kOk, PolhemusFrame::kBytes, next};
+    }
+    IoStatus write(std::span<const std::byte> bytes, Time) override {
+      port.sends_ = bytes.front() == std::byte{'C'};
+      return IoStatus::kOk;
+    }
+    IoStatus clear_stall() override { return IoStatus::kOk; }
+    BadStart& port;
+  };
+  IoStatus failure_;
+  Clock& clock_;
+  bool sends_ = false;
+  int failed_reads_ = 0;
+  std::uint32_t count_ = 0;
+};
+
+TEST(DeviceTracker, ErrorsWhileItIsStartedDoNotPutItOff) {
+  for (const IoStatus failure : {IoStatus::kIo, IoStatus::kStall, IoStatus::kOverflow}) {
+    VirtualClock clock{kStart};
+    auto port = std::make_unique<BadStart>(failure, clock);
+    const BadStart& device = *port;
+    DeviceTracker tracker(
+        std::move(port), std::make_unique<PolhemusProtocol>(PolhemusModel::kLiberty), {}, clock);
+    EXPECT_TRUE(tracker.wait_pose(milliseconds(200))) << "the commands take 0.11 s";
+    EXPECT_EQ(tracker.status().counters.opened, 1U);
+    EXPECT_EQ(device.failed_reads(), 4) << "one a pause: no busy loop";
+    EXPECT_EQ(tracker.status().counters.io_errors, 4U);
+  }
 }
 
 TEST(DeviceTracker, ASeededStormOfFaultsIsSurvivedAndRepeatable) {
