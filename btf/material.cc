@@ -97,6 +97,7 @@ Status FitOptions::check() const {
   VENEER_TRY(check_range("clusters", clusters, 1, kMostClusters));
   VENEER_TRY(check_range("angular", angular, kLeastAngular, kMostAngular));
   VENEER_TRY(check_range("lobes", lobes, 1, kMostLobes));
+  VENEER_TRY(check_range("mip_levels", mip_levels, 1, 15));
   VENEER_TRY(check_range("basis", basis, 0, 4096));
   VENEER_TRY(check_range("iterations", iterations, 1, 10000));
   VENEER_TRY(parse_components(components));

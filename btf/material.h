@@ -47,6 +47,9 @@ struct FitOptions {
   /// Whether dichromatic-lpca finds the clusters of its two terms together: "joint" (empty takes
   /// it), "separate", or "measured", whichever serves.
   std::string clustering;
+  /// The sample and what it shows from further away: each level halves the texels along a side. 1
+  /// is the sample alone; up to as many as halving leaves a texel along both sides (texel-colours).
+  int mip_levels = 1;
   /// Columns of the randomised basis in which clusters are found; 0 fits in the full space.
   int basis = 160;
   /// Lloyd iterations at most, from each start and after each swap of clusters.
@@ -69,6 +72,8 @@ class Material {
   [[nodiscard]] virtual int height() const = 0;  ///< texels
   [[nodiscard]] virtual const DirectionSet& views() const = 0;
   [[nodiscard]] virtual const DirectionSet& lights() const = 0;
+  /// With more than one, texels below may also be of a mip level, numbered as in TexelPyramid.
+  [[nodiscard]] virtual int mip_levels() const { return 1; }
   /// What the factors alone give for one texel at every measured pair: [view][light][3], linear
   /// RGB, not clamped. This is what the tables of the literature measure.
   virtual void reconstruct(int texel, std::span<float> rgb) const = 0;

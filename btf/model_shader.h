@@ -65,7 +65,9 @@ struct EigenCache {
 /// What the renderer needs to draw a material: GLSL that defines
 /// `vec3 btf_radiance(vec2 uv, vec3 view, vec3 light)` in the sample's unit, and its textures.
 /// `uv` is in repeats of the sample (uv.x = 1 is one width to the right), `view` and `light` are
-/// unit vectors in the local frame; view.z may be slightly below 0 at silhouettes.
+/// unit vectors in the local frame; view.z may be slightly below 0 at silhouettes. Of a material
+/// with mip levels (Material::mip_levels) the source declares `int texel_level`, the level that is
+/// read, which is 0 until it is set.
 ///
 /// Who draws may define SPECULAR_WEIGHT before the source, an expression in 0 to 1. A model whose
 /// specular part is a term of its own (Material::has_specular_term()) multiplies it by that, in

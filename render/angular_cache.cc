@@ -96,12 +96,12 @@ std::string cache_values_compute_source(const btf::ModelShader& shader) {
 std::string draw_cached_fragment_source(const btf::ModelShader& shader,
                                         int light_count,
                                         int spacing,
-                                        const AverageOver& average_over) {
+                                        const TexelFilter& filter) {
   return surface_header(light_count) + "#define CACHE_PIXELS\n" + cache_constants(*shader.cache) +
          fmt::format("const int kCacheLightLayers = {};\n",
                      shader.cache->clusters * shader.cache->layers) +
          place_constants(spacing) + kCachedEigenGlsl + shader.source +
-         radiance_source("btf_radiance_cached(uv)", average_over) + kDrawCachedFrag;
+         radiance_source("btf_radiance_cached(uv)", filter) + kDrawCachedFrag;
 }
 
 Result<AngularCache> AngularCache::create(const btf::ModelShader& shader,

@@ -6,7 +6,6 @@
 #include <Eigen/Core>
 
 #include <cstddef>
-#include <optional>
 #include <string>
 
 #include "btf/model_shader.h"
@@ -14,12 +13,9 @@
 #include "render/gl_objects.h"
 #include "render/mesh_buffers.h"
 #include "render/model_textures.h"
+#include "render/texel_filter.h"
 
 namespace veneer::render {
-
-/// Texels of the sample, where what they show is averaged over a pixel (texels.glsl); none where a
-/// pixel shows the texel at its centre.
-using AverageOver = std::optional<Eigen::Vector2i>;
 
 /// Nodes beyond each edge of the raster.
 inline constexpr int kCacheMargin = 1;
@@ -42,7 +38,7 @@ struct CacheRaster {
 [[nodiscard]] std::string draw_cached_fragment_source(const btf::ModelShader& shader,
                                                       int light_count,
                                                       int spacing,
-                                                      const AverageOver& average_over = {});
+                                                      const TexelFilter& filter = {});
 
 /// What depends on directions alone in a clustered model, evaluated at nodes every few pixels and
 /// interpolated between them by the texture units. Node (i, j) lies at the corner (i, j) * spacing

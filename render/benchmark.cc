@@ -121,7 +121,7 @@ class Bench {
     const calibration::ProjectorProfile profile = bench_profile(options.width, options.height);
     const Compensation compensation(profile, {});
     VENEER_ASSIGN(CompensatePass compensate, CompensatePass::create(compensation, profile));
-    Bench bench(std::move(context), profile, std::move(compensate));
+    Bench bench(std::move(context), profile, std::move(compensate), options.texels_per_pixel);
     const btf::ModelShader plain = plain_textures();
     VENEER_TRY(bench.add(
         "plain",
@@ -130,8 +130,7 @@ class Bench {
     for (const auto& [name, material, cache, average_texels] : options.materials) {
       const btf::ModelShader shader = material->shader();
       const Eigen::Vector2d repeats = bench.repeats(material->width(), material->height());
-      DrawOptions draw{.cache = cache};
-      if (average_texels) draw.average_over = {material->width(), material->height()};
+      const DrawOptions draw{.cache = cache, .filter = texel_filter(*material, average_texels)};
       VENEER_TRY(
           bench.add(name, shader, DrawPass::create(shader, {kLight}, repeats, profile, draw)));
     }
@@ -146,13 +145,18 @@ class Bench {
       if (frame >= 0) progress.advance();
     }
     progress.finish();
-    if (options.reference != nullptr) VENEER_TRY(compare(*options.reference, progress));
+    if (options.reference != nullptr)
+      VENEER_TRY(compare(*options.reference, options.reference_rays, progress));
     return summary();
   }
 
  private:
-  Bench(EglContext context, calibration::ProjectorProfile profile, CompensatePass compensate)
+  Bench(EglContext context,
+        calibration::ProjectorProfile profile,
+        CompensatePass compensate,
+        double texels_per_pixel)
       : context_(std::move(context)),
+        texels_per_pixel_(texels_per_pixel),
         profile_(std::move(profile)),
         mesh_(frame_filling_mesh(profile_.geometry)),
         target_(make_texture_2d(GL_RGBA16F, profile_.geometry.width, profile_.geometry.height)),
@@ -165,10 +169,11 @@ class Bench {
     glNamedFramebufferTexture(framebuffer_.id(), GL_DEPTH_ATTACHMENT, depth_.id(), 0);
   }
 
-  // Texels as large as pixels: as many repeats as it takes to lay the material side by side.
+  // As many repeats as it takes to lay the material side by side.
   [[nodiscard]] Eigen::Vector2d repeats(int width, int height) const {
-    return {static_cast<double>(profile_.geometry.width) / width,
-            static_cast<double>(profile_.geometry.height) / height};
+    return texels_per_pixel_ *
+           Eigen::Vector2d(static_cast<double>(profile_.geometry.width) / width,
+                           static_cast<double>(profile_.geometry.height) / height);
   }
 
   Status add(const std::string& name, const btf::ModelShader& shader, Result<DrawPass> pass) {
@@ -192,7 +197,7 @@ class Bench {
   }
 
   // What the materials draw at some of the timed frames, against the set.
-  Status compare(const btf::InterpolatedSet& set, Progress& progress) {
+  Status compare(const btf::InterpolatedSet& set, int rays, Progress& progress) {
     const btf::SampleSetInfo& info = set.set().info();
     const auto pixels = static_cast<std::size_t>(profile_.geometry.width) *
                         static_cast<std::size_t>(profile_.geometry.height);
@@ -208,7 +213,8 @@ class Bench {
                                  repeats(info.width, info.height),
                                  profile_,
                                  info,
-                                 kComparedPixels));
+                                 kComparedPixels,
+                                 rays));
       const std::vector<Vector3d> reference = reference_at(set, queries);
       for (std::size_t e = 1; e + 1 < entrants_.size(); ++e) {
         entrants_[e].pass->draw(framebuffer_.id(), mesh_, input);
@@ -285,6 +291,7 @@ class Bench {
   }
 
   EglContext context_;  // first, so that it goes last
+  double texels_per_pixel_;
   calibration::ProjectorProfile profile_;
   MeshBuffers mesh_;
   GlTexture target_;
@@ -305,6 +312,14 @@ Status RenderBenchOptions::check() const {
                 height);
   if (frames < 3 || frames > 10000)
     return fail(Errc::kInvalidOption, "timing: {} frames; 3 to 10000 can be timed", frames);
+  if (!(texels_per_pixel >= 1.0 / 16 && texels_per_pixel <= 16.0))
+    return fail(Errc::kInvalidOption,
+                "timing: {} texels a pixel; 0.0625 to 16 can be drawn",
+                texels_per_pixel);
+  if (reference_rays < 1 || reference_rays > 32)
+    return fail(Errc::kInvalidOption,
+                "timing: {} rays along a pixel's side; 1 to 32 can be compared",
+                reference_rays);
   if (reference != nullptr) {
     for (const RenderBenchMaterial& m : materials) {
       const btf::SampleSetInfo& info = reference->set().info();

@@ -30,8 +30,13 @@ struct RenderBenchOptions {
   /// Timed draws of each material, after two that are not. 3 to 10000.
   int frames = 40;
   std::vector<RenderBenchMaterial> materials{};
+  /// Of a pixel's side. 1/16 to 16.
+  double texels_per_pixel = 1.0;
   /// What the materials were fitted on: what they draw is then compared with it, pixel by pixel.
   const btf::InterpolatedSet* reference = nullptr;
+  /// Along each side of a pixel that is compared: 1 asks for the texel at its centre, more for the
+  /// mean over the pixel. 1 to 32.
+  int reference_rays = 1;
   [[nodiscard]] Status check() const;
 };
 
@@ -57,13 +62,13 @@ struct RenderBenchResult {
       timings;  ///< "plain" first, then the materials in order, then "compensation"
 };
 
-/// Times drawing a curved mesh that covers the whole frame, texels about as large as pixels, one
-/// directional light, into half floats with depth. "plain" is the yardstick: the same mesh,
-/// interpolants and target, one filtered fetch times the light's cosine. All draws take turns
-/// within every frame, so that a change in the machine's load hits all alike. "compensation" is the
-/// full-screen pass that follows a draw in the renderer (with its counters); no material's figure
-/// contains it. The GL timer query is used where it is plausible, else glFinish and the clock.
-/// Errors: kInvalidOption, kUnavailable (no GL 4.5).
+/// Times drawing a curved mesh that covers the whole frame, texels_per_pixel texels along a
+/// pixel's side, one directional light, into half floats with depth. "plain" is the yardstick: the
+/// same mesh, interpolants and target, one filtered fetch times the light's cosine. All draws take
+/// turns within every frame, so that a change in the machine's load hits all alike. "compensation"
+/// is the full-screen pass that follows a draw in the renderer (with its counters); no material's
+/// figure contains it. The GL timer query is used where it is plausible, else glFinish and the
+/// clock. Errors: kInvalidOption, kUnavailable (no GL 4.5).
 [[nodiscard]] Result<RenderBenchResult> bench_render(const RenderBenchOptions& options,
                                                      Progress& progress);
 

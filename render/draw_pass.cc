@@ -23,9 +23,6 @@ constexpr char kDrawFrag[] =
 #include "render/shaders/draw.frag.inc"
     ;
 
-constexpr char kTexelsGlsl[] =
-#include "render/shaders/texels.glsl.inc"
-    ;
 constexpr char kPlainFrag[] =
 #include "render/shaders/plain.frag.inc"
     ;
@@ -85,20 +82,9 @@ std::string surface_header(int light_count) { return header(light_count) + kSurf
 
 std::string draw_fragment_source(const std::string& model_source,
                                  int light_count,
-                                 const AverageOver& average_over) {
+                                 const TexelFilter& filter) {
   return surface_header(light_count) + model_source + "\n" +
-         radiance_source("btf_radiance(uv, view, light)", average_over) + kDrawFrag;
-}
-
-std::string radiance_source(std::string_view sample, const AverageOver& average_over) {
-  if (!average_over) return fmt::format("#define RADIANCE(uv, view, light) {}\n", sample);
-  return fmt::format(
-      "#define SAMPLE(uv, view, light) {}\nconst vec2 kSampleTexels = vec2({}, {});\n{}"
-      "#define RADIANCE(uv, view, light) over_texels(uv, view, light)\n",
-      sample,
-      average_over->x(),
-      average_over->y(),
-      kTexelsGlsl);
+         radiance_source("btf_radiance(uv, view, light)", filter) + kDrawFrag;
 }
 
 std::string plain_fragment_source() { return header(1) + kPlainFrag; }
@@ -136,8 +122,7 @@ Result<DrawPass> DrawPass::create(const btf::ModelShader& shader,
   VENEER_TRY(options.cache.check());
   const auto light_count = static_cast<int>(lights.size());
   DrawPass pass(std::move(lights), texture_repeats, profile);
-  VENEER_TRY(
-      pass.link(draw_fragment_source(shader.source, light_count, options.average_over), shader));
+  VENEER_TRY(pass.link(draw_fragment_source(shader.source, light_count, options.filter), shader));
   if (options.cache.spacing > 0 && shader.cache) VENEER_TRY(pass.add_cache(shader, options));
   return pass;
 }
@@ -145,13 +130,12 @@ Result<DrawPass> DrawPass::create(const btf::ModelShader& shader,
 Status DrawPass::add_cache(const btf::ModelShader& shader, const DrawOptions& options) {
   const auto light_count = static_cast<int>(lights_.size());
   VENEER_ASSIGN(cache_, AngularCache::create(shader, light_count, options.cache, width_, height_));
-  VENEER_ASSIGN(
-      cached_program_,
-      link_program({{GL_VERTEX_SHADER, "draw.vert", draw_vertex_source(light_count)},
-                    {GL_FRAGMENT_SHADER,
-                     "draw_cached.frag",
-                     draw_cached_fragment_source(
-                         shader, light_count, options.cache.spacing, options.average_over)}}));
+  VENEER_ASSIGN(cached_program_,
+                link_program({{GL_VERTEX_SHADER, "draw.vert", draw_vertex_source(light_count)},
+                              {GL_FRAGMENT_SHADER,
+                               "draw_cached.frag",
+                               draw_cached_fragment_source(
+                                   shader, light_count, options.cache.spacing, options.filter)}}));
   ModelTextures::assign_units(shader, cached_program_.id());
   cache_->assign(cached_program_.id());
   node_uniforms_ = make_buffer(nullptr, sizeof(FrameBlock), GL_DYNAMIC_STORAGE_BIT);

@@ -7,7 +7,6 @@
 
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "base/rigid_transform.h"
@@ -18,12 +17,13 @@
 #include "render/mesh_buffers.h"
 #include "render/model_textures.h"
 #include "render/scene.h"
+#include "render/texel_filter.h"
 
 namespace veneer::render {
 
 struct DrawOptions {
   AngularCacheOptions cache{};
-  AverageOver average_over{};
+  TexelFilter filter{};
 };
 
 /// Clip coordinates from the projector's frame. Row 0 of the framebuffer is the first row of the
@@ -39,9 +39,7 @@ inline constexpr double kNearPlane = 0.01;  // metres
 [[nodiscard]] std::string surface_header(int light_count);
 [[nodiscard]] std::string draw_fragment_source(const std::string& model_source,
                                                int light_count,
-                                               const AverageOver& average_over = {});
-/// Defines RADIANCE(uv, view, light), what a pixel shows of the model's function `sample`.
-[[nodiscard]] std::string radiance_source(std::string_view sample, const AverageOver& average_over);
+                                               const TexelFilter& filter = {});
 /// The same for the benchmark's yardstick, plain.frag, which reads the texture "Albedo".
 [[nodiscard]] std::string plain_fragment_source();
 

@@ -14,7 +14,7 @@
 namespace veneer::render {
 
 /// A material that is nothing but a shader.
-class ShaderMaterial final : public btf::Material {
+class ShaderMaterial : public btf::Material {
  public:
   explicit ShaderMaterial(btf::ModelShader shader) : shader_(std::move(shader)) {}
   /// @param body  of `vec3 btf_radiance(vec2 uv, vec3 view, vec3 light)`.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -10,6 +11,7 @@
 #include "base/random.h"
 #include "base/testing/temporary_folder.h"
 #include "btf/material.h"
+#include "btf/texel_pyramid.h"
 #include "render/compensate_pass.h"
 #include "render/draw_pass.h"
 #include "render/egl_context.h"
@@ -28,6 +30,8 @@ using Eigen::Vector3d;
 using Eigen::Vector4f;
 
 constexpr int kTexels = 8;  // along a side
+constexpr int kMipLevels = 3;
+constexpr const char* kWithMipLevels = "texel-colours with mip levels";
 
 // Body colour and gloss differ from texel to texel: Lambert, and a lobe about the mirror direction.
 void fill(std::span<Eigen::half> out, const btf::SampleSetInfo& info, int texel) {
@@ -106,6 +110,11 @@ std::vector<Fitted> fit_all(const btf::SampleSet& set) {
       all.push_back(
           {fmt::format("dichromatic-lpca {} {}", specular, clustering), std::move(*material)});
   }
+  btf::FitOptions options = quick_options("3+1");
+  options.mip_levels = kMipLevels;
+  auto material = (*btf::find_model("texel-colours"))->fit(set, options, progress);
+  EXPECT_TRUE(material) << material.error().what;
+  if (material) all.push_back({kWithMipLevels, std::move(*material)});
   return all;
 }
 
@@ -187,7 +196,10 @@ void main() {
 )";
 }
 
-Result<std::vector<Vector4f>> draw(const btf::ModelShader& shader, const std::vector<Query>& all) {
+// Of a level of `side` x `side` texels.
+Result<std::vector<Vector4f>> draw(const btf::ModelShader& shader,
+                                   const std::vector<Query>& all,
+                                   int side = kTexels) {
   VENEER_ASSIGN(const GlProgram program,
                 link_program({{GL_VERTEX_SHADER, "fullscreen.vert", fullscreen_vertex_source()},
                               {GL_FRAGMENT_SHADER, "the model", probe_source(shader)}}));
@@ -196,8 +208,11 @@ Result<std::vector<Vector4f>> draw(const btf::ModelShader& shader, const std::ve
   for (std::size_t i = 0; i < all.size(); ++i) {
     // In any repeat of the sample, those at negative coordinates too.
     const auto repeat = static_cast<float>(static_cast<int>(i % 5) - 2);
-    const float u = (static_cast<float>(all[i].texel % kTexels) + 0.5F) / kTexels + repeat;
-    const float v = (static_cast<float>(all[i].texel / kTexels) + 0.5F) / kTexels - repeat;
+    const auto centre = [side](int texel) {
+      return (static_cast<float>(texel) + 0.5F) / static_cast<float>(side);
+    };
+    const float u = centre(all[i].texel % side) + repeat;
+    const float v = centre(all[i].texel / side) - repeat;
     input.emplace_back(u, v, 0.0F, 0.0F);
     for (const Direction& d : {all[i].view, all[i].light})
       input.emplace_back(
@@ -309,6 +324,36 @@ TEST(ModelShaders, FadeTheirSpecularTerm) {
   EXPECT_GE(with_term, 5);
 }
 
+TEST(ModelShaders, DrawTheMipLevelThatIsSet) {
+  const auto context = EglContext::create();
+  if (!context) GTEST_SKIP() << context.error().what;
+  const auto fit = std::ranges::find(fitted(), kWithMipLevels, &Fitted::name);
+  ASSERT_NE(fit, fitted().end());
+  const btf::TexelPyramid pyramid(kTexels, kTexels, kMipLevels);
+  for (int level = 0; level < kMipLevels; ++level) {
+    const int side = pyramid.width(level);
+    std::vector<Query> all = queries(kColumns * kRows);
+    for (Query& query : all) query.texel %= side * side;
+    btf::ModelShader shader = fit->material->shader();
+    const std::string start = "int texel_level = 0;";
+    const std::size_t at = shader.source.find(start);
+    ASSERT_NE(at, std::string::npos);
+    shader.source.replace(at, start.size(), fmt::format("int texel_level = {};", level));
+    const auto drawn = draw(shader, all, side);
+    ASSERT_TRUE(drawn) << drawn.error().what;
+    double sum = 0;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const Vector3d wanted =
+          fit->material->radiance(pyramid.first(level) + all[i].texel, all[i].view, all[i].light);
+      const double difference =
+          (wanted - (*drawn)[i].head<3>().cast<double>()).cwiseAbs().maxCoeff();
+      ASSERT_LE(difference, kLargestDifference) << "level " << level << ", texel " << all[i].texel;
+      sum += difference;
+    }
+    EXPECT_LE(sum / static_cast<double>(all.size()), kMeanDifference);
+  }
+}
+
 // What the angular cache draws of a model is what its shader draws, to the interpolation between
 // nodes that stand closer than the measured directions: on average the difference is small beside
 // the sample's 0.2 to 1.3, while a wrong cluster or component would show everywhere.
@@ -341,7 +386,12 @@ TEST(ModelShaders, CachedDrawsFollowThePerPixelDraw) {
     std::vector<std::vector<Vector4f>> drawn;
     for (const AngularCacheOptions& cache :
          {AngularCacheOptions{}, AngularCacheOptions{.spacing = 4, .most_turn = 0.2}}) {
-      const auto pass = DrawPass::create(shader, lights, {5, 5}, profile, {.cache = cache});
+      const auto pass =
+          DrawPass::create(shader,
+                           lights,
+                           {5, 5},
+                           profile,
+                           {.cache = cache, .filter = texel_filter(*fit.material, false)});
       ASSERT_TRUE(pass) << pass.error().what;
       for (const double weight : kWeights) {
         input.specular_weight = weight;

@@ -68,8 +68,8 @@ class GlRenderer final : public Renderer {
                                                   const btf::Material& material,
                                                   const calibration::ProjectorProfile& profile,
                                                   const RendererOptions& options) {
-    DrawOptions draw_options{.cache = options.cache};
-    if (options.average_texels) draw_options.average_over = {material.width(), material.height()};
+    const DrawOptions draw_options{.cache = options.cache,
+                                   .filter = texel_filter(material, options.average_texels)};
     VENEER_ASSIGN(
         DrawPass draw,
         DrawPass::create(

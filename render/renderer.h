@@ -27,7 +27,8 @@ struct RendererOptions {
   double geometry_floor = 0.05;
   AngularCacheOptions cache{};
   /// Each pixel shows the mean of the texels under it, up to two along each side, in place of the
-  /// texel at its centre: four evaluations, and no jagged edges between texels.
+  /// texel at its centre: four evaluations, and no jagged edges between texels. Of materials with
+  /// mip levels either is done on the level that suits the pixel's size.
   bool average_texels = false;
 };
 

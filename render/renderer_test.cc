@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -229,6 +230,58 @@ TEST_F(RendererTest, FadesTheSpecularTerm) {
       EXPECT_GT(covered, 500);
     }
   }
+}
+
+// A material that shows which mip level is read.
+class LevelMaterial final : public ShaderMaterial {
+ public:
+  LevelMaterial(int side, int levels)
+      : ShaderMaterial(btf::ModelShader{
+            .source = "int texel_level = 0;\nvec3 btf_radiance(vec2 uv, vec3 view, vec3 light) { "
+                      "return vec3(texel_level + 1); }"}),
+        side_(side),
+        levels_(levels) {}
+  [[nodiscard]] int width() const override { return side_; }
+  [[nodiscard]] int height() const override { return side_; }
+  [[nodiscard]] int mip_levels() const override { return levels_; }
+
+ private:
+  int side_;
+  int levels_;
+};
+
+TEST_F(RendererTest, ReadsTheMipLevelThatSuitsThePixel) {
+  constexpr double kNearlyBetween = 0.1;  // where interpolation in float may choose the other
+  const FrameInput input = tilted_frame();
+  constexpr int kLevels = 5;
+  std::set<int> seen;
+  for (const int side : {16, 50, 100, 220, 500, 3000})
+    for (const bool average : {false, true}) {
+      const auto renderer =
+          make(plate_scene(), LevelMaterial(side, kLevels), {.average_texels = average});
+      renderer->draw(input);
+      Image<Rgb32f> target(kWidth, kHeight);
+      renderer->read_target(target.view());
+      int compared = 0;
+      for (int y = 0; y < kHeight; ++y)
+        for (int x = 0; x < kWidth; ++x) {
+          const auto at = [&](double dx, double dy) {
+            return point_on_plate(profile_.geometry, input, x + 0.5 + dx, y + 0.5 + dy);
+          };
+          if (!at(-2, -2) || !at(2, -2) || !at(-2, 2) || !at(2, 2)) continue;
+          const Vector3d width =
+              (*at(0.5, 0) - *at(-0.5, 0)).cwiseAbs() + (*at(0, 0.5) - *at(0, -0.5)).cwiseAbs();
+          const double level =
+              std::clamp(std::log2(width.maxCoeff() / 0.2 * side), 0.0, kLevels - 1.0);
+          if (std::abs(level - std::floor(level) - 0.5) < kNearlyBetween) continue;
+          const auto shown = (srgb_from_xyz() * target(x, y).cast<double>()).y() - 1;
+          ASSERT_NEAR(shown, std::round(level), 0.01) << side << " texels at " << x << ", " << y;
+          seen.insert(static_cast<int>(std::round(level)));
+          ++compared;
+        }
+      EXPECT_GT(compared, 100) << side;
+    }
+  EXPECT_EQ(seen, (std::set{0, 1, 2, 3, 4}));
 }
 
 // A checkerboard of black and white texels, each a little larger than a pixel.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "base/colour.h"
@@ -24,9 +25,44 @@ constexpr double kTexelEdge = 0.02;
 constexpr std::array kProbes{
     "return vec3(uv + 1.0, 0.5);", "return 0.5 * view + 1.0;", "return 0.5 * light + 1.0;"};
 
+int texel_along(double uv, int size) {
+  return std::min(static_cast<int>((uv - std::floor(uv)) * size), size - 1);
+}
+
+bool is_near_edge(double uv, int size) {
+  const double place = uv * size;
+  return std::abs(place - std::round(place)) < kTexelEdge;
+}
+
 double encode(double linear) { return std::pow(std::clamp(linear, 0.0, 1.0), kEncodingExponent); }
 
+Vector3d seen(const btf::InterpolatedSet& set, const ScreenQuery& query) {
+  Vector3d sum = Vector3d::Zero();
+  for (const auto& [texel, part] : query.shares)
+    sum += part * set.radiance(texel, query.view, query.light);
+  return sum;
+}
+
 }  // namespace
+
+std::vector<ScreenQuery::Share> shares_of(const Eigen::Vector2d& uv,
+                                          const Eigen::Vector2d& right,
+                                          const Eigen::Vector2d& down,
+                                          int width,
+                                          int height,
+                                          int rays) {
+  std::map<int, int> hits;
+  for (int j = 0; j < rays; ++j)
+    for (int i = 0; i < rays; ++i) {
+      const Eigen::Vector2d at =
+          uv + ((i + 0.5) / rays - 0.5) * right + ((j + 0.5) / rays - 0.5) * down;
+      ++hits[texel_along(at.y(), height) * width + texel_along(at.x(), width)];
+    }
+  std::vector<ScreenQuery::Share> shares;
+  for (const auto& [texel, count] : hits)
+    shares.push_back({texel, count / static_cast<double>(rays * rays)});
+  return shares;
+}
 
 Result<std::vector<ScreenQuery>> probe_screen(const MeshBuffers& mesh,
                                               const DrawInput& input,
@@ -34,7 +70,8 @@ Result<std::vector<ScreenQuery>> probe_screen(const MeshBuffers& mesh,
                                               const Eigen::Vector2d& repeats,
                                               const calibration::ProjectorProfile& profile,
                                               const btf::SampleSetInfo& set,
-                                              int wanted) {
+                                              int wanted,
+                                              int rays) {
   const int width = profile.geometry.width;
   const int height = profile.geometry.height;
   const GlTexture target = make_texture_2d(GL_RGBA32F, width, height);
@@ -65,22 +102,30 @@ Result<std::vector<ScreenQuery>> probe_screen(const MeshBuffers& mesh,
 
   std::vector<ScreenQuery> queries;
   const std::size_t stride = std::max<std::size_t>(pixels / static_cast<std::size_t>(wanted), 1);
+  const auto row = static_cast<std::size_t>(width);
+  const auto uv_of = [&shown](std::size_t i) -> Eigen::Vector2d { return shown[0][i].head<2>(); };
+  const auto is_covered = [&shown](std::size_t i) { return shown[0][i] != Vector3d::Zero(); };
   for (std::size_t i = stride / 2; i < pixels; i += stride) {
-    if (shown[0][i] == Vector3d::Zero()) continue;
-    const auto texel_along = [](double uv, int size, bool& edge) {
-      const double place = (uv - std::floor(uv)) * size;
-      edge |= std::abs(place - std::round(place)) < kTexelEdge;
-      return std::min(static_cast<int>(place), size - 1);
-    };
-    bool edge = false;
-    const int x = texel_along(shown[0][i].x(), set.width, edge);
-    const int y = texel_along(shown[0][i].y(), set.height, edge);
-    if (edge) continue;
+    if (!is_covered(i)) continue;
+    const Eigen::Vector2d uv = uv_of(i);
+    Eigen::Vector2d right = Eigen::Vector2d::Zero();
+    Eigen::Vector2d down = right;
+    if (rays > 1) {
+      if (i % row == 0 || i % row == row - 1 || i < row || i + row >= pixels) continue;
+      if (!(is_covered(i - 1) && is_covered(i + 1) && is_covered(i - row) && is_covered(i + row)))
+        continue;
+      right = (uv_of(i + 1) - uv_of(i - 1)) / 2;
+      down = (uv_of(i + row) - uv_of(i - row)) / 2;
+    } else if (is_near_edge(uv.x(), set.width) || is_near_edge(uv.y(), set.height)) {
+      continue;
+    }
     const auto direction = [i](const std::vector<Vector3d>& colours) {
       return btf::Direction((2.0 * (colours[i].array() - 1.0)).matrix().normalized());
     };
-    queries.push_back(
-        {static_cast<int>(i), y * set.width + x, direction(shown[1]), direction(shown[2])});
+    queries.push_back({static_cast<int>(i),
+                       shares_of(uv, right, down, set.width, set.height, rays),
+                       direction(shown[1]),
+                       direction(shown[2])});
   }
   return queries;
 }
@@ -95,7 +140,7 @@ std::vector<Vector3d> reference_at(const btf::InterpolatedSet& set,
   parallel_for(
       static_cast<std::int64_t>(queries.size()), 64, [&](std::int64_t begin, std::int64_t end) {
         for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i)
-          values[i] = set.radiance(queries[i].texel, queries[i].view, queries[i].light);
+          values[i] = seen(set, queries[i]);
       });
   return values;
 }

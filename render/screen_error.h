@@ -14,14 +14,21 @@ namespace veneer::render {
 /// What one drawn pixel asks of the material.
 struct ScreenQuery {
   int pixel;  ///< row * width + column
-  int texel;
+  /// The texels that it sees and the share of each; the shares add up to 1.
+  struct Share {
+    int texel;
+    double part;
+  };
+  std::vector<Share> shares;
   btf::Direction view;
   btf::Direction light;
 };
 
 /// Reads back from the GPU what about `wanted` of the pixels ask, spread over those that a mesh
-/// covers, under one directional light. Pixels so near the edge of a texel that rounding decides
-/// are left out. Needs a current context. Errors: kUnavailable.
+/// covers, under one directional light. With `rays` = 1 a pixel sees the texel at its centre, and
+/// pixels so near the edge of a texel that rounding decides are left out. With more, rays x rays
+/// spread evenly over the pixel see what they hit, all from its centre's directions; pixels without
+/// four covered neighbours are left out. Needs a current context. Errors: kUnavailable.
 [[nodiscard]] Result<std::vector<ScreenQuery>> probe_screen(
     const MeshBuffers& mesh,
     const DrawInput& input,
@@ -29,7 +36,17 @@ struct ScreenQuery {
     const Eigen::Vector2d& repeats,
     const calibration::ProjectorProfile& profile,
     const btf::SampleSetInfo& set,
-    int wanted);
+    int wanted,
+    int rays = 1);
+
+/// What rays x rays over a pixel see of width x height texels around uv, in repeats; `right`
+/// and `down` are how far uv moves from pixel to pixel.
+[[nodiscard]] std::vector<ScreenQuery::Share> shares_of(const Eigen::Vector2d& uv,
+                                                        const Eigen::Vector2d& right,
+                                                        const Eigen::Vector2d& down,
+                                                        int width,
+                                                        int height,
+                                                        int rays);
 
 /// Sums of |drawn - reference| in the sample's unit, both cut to [0, 1] and encoded with 1/2.2.
 struct ScreenError {

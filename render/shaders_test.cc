@@ -21,9 +21,12 @@ TEST(Shaders, AreValidByTheReferenceCompiler) {
   for (const int lights : {1, kMaxLights}) {
     EXPECT_EQ(glslang_complaints(draw_vertex_source(lights), "vert"), "");
     EXPECT_EQ(glslang_complaints(draw_fragment_source(kAnyModel, lights), "frag"), "");
-    EXPECT_EQ(
-        glslang_complaints(draw_fragment_source(kAnyModel, lights, Eigen::Vector2i(4, 3)), "frag"),
-        "");
+    const std::string with_levels = std::string("int texel_level = 0;\n") + kAnyModel;
+    for (const bool average : {false, true})
+      for (const int levels : {1, 2})
+        EXPECT_EQ(glslang_complaints(
+                      draw_fragment_source(with_levels, lights, {{4, 3}, levels, average}), "frag"),
+                  "");
   }
 }
 

@@ -63,6 +63,14 @@ Status refuse_form(const FitOptions& options, std::string_view model) {
               model);
 }
 
+Status refuse_mip_levels(const FitOptions& options, std::string_view model) {
+  if (options.mip_levels == 1) return {};
+  return fail(Errc::kInvalidOption,
+              "fit: mip_levels is {}; {} has no mip levels, only texel-colours has: leave it out",
+              options.mip_levels,
+              model);
+}
+
 Status refuse_precision(const FitOptions& options, std::string_view model) {
   if (options.precision.empty()) return {};
   return fail(Errc::kInvalidOption,

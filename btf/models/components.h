@@ -33,6 +33,9 @@ inline constexpr int kMostComponents = 16;
 /// For models that keep everything in one precision. Errors: kInvalidOption.
 [[nodiscard]] Status refuse_precision(const FitOptions& options, std::string_view model);
 
+/// For models without mip levels. Errors: kInvalidOption.
+[[nodiscard]] Status refuse_mip_levels(const FitOptions& options, std::string_view model);
+
 /// Kinds of FitOptions::precision.
 enum class Precision { k8Bit, kFloat16 };
 /// `otherwise` where the options leave it open. Errors: kInvalidOption.

@@ -44,6 +44,7 @@ set(VENEER_MODEL_TESTS
   models/lobes/lobe_models_test.cc
   models/load_material_test.cc
   models/local_pca_test.cc
+  models/mip_levels_test.cc
   models/models_test.cc
   models/real_material_test.cc
   models/revised_lpca/revised_lpca_test.cc)
@@ -63,4 +64,5 @@ set(VENEER_MODEL_SHADERS
   models/scaled_lafortune/scaled_lafortune.glsl
   models/specular_weight.glsl
   models/texel_at.glsl
-  models/texel_colours/texel_colours.glsl)
+  models/texel_colours/texel_colours.glsl
+  models/texel_of_level.glsl)

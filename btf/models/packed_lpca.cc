@@ -15,12 +15,10 @@ namespace veneer::btf {
 namespace {
 
 constexpr int kScalarsPerVolume = 4;
+constexpr const char* kMipLevels = "mip_levels";
 
 constexpr char kElevatedConcentricGlsl[] =
 #include "btf/models/elevated_concentric.glsl.inc"
-    ;
-constexpr char kTexelAtGlsl[] =
-#include "btf/models/texel_at.glsl.inc"
     ;
 constexpr char kClusterVolumeGlsl[] =
 #include "btf/models/cluster_volume.glsl.inc"
@@ -68,9 +66,23 @@ Status PackedLpca::check(const MaterialFrame& frame,
                          int clusters,
                          Errc code,
                          std::string_view doing) {
-  VENEER_TRY(texels_of(layout).check(frame, code, doing));
+  const int most_levels = TexelPyramid::most_levels(frame.width, frame.height);
+  if (layout.mip_levels > most_levels)
+    return fail(code,
+                "{}: mip_levels is {}; {} x {} texels have at most {}",
+                doing,
+                layout.mip_levels,
+                frame.width,
+                frame.height,
+                most_levels);
+  const TexelPyramid pyramid = pyramid_of(frame, layout);
+  VENEER_TRY(texels_of(layout).check(pyramid, code, doing));
   return ClusterVolume::check(
-      volume_bytes(frame, layout, std::min(clusters, frame.texel_count())), code, doing);
+      volume_bytes(frame, layout, std::min(clusters, pyramid.texel_count())), code, doing);
+}
+
+TexelPyramid PackedLpca::pyramid_of(const MaterialFrame& frame, const Layout& layout) {
+  return {frame.width, frame.height, layout.mip_levels};
 }
 
 Result<PackedLpca> PackedLpca::fit(const MaterialFrame& frame,
@@ -81,7 +93,7 @@ Result<PackedLpca> PackedLpca::fit(const MaterialFrame& frame,
   VENEER_TRY(check(frame, layout, options.clusters, Errc::kInvalidOption, "fit"));
   const auto count = static_cast<std::size_t>(frame.pair_count());
   const auto source_of = [&](int parts, std::function<void(int, std::span<float>)> rows) {
-    return RowSource{frame.texel_count(),
+    return RowSource{pyramid_of(frame, layout).texel_count(),
                      std::vector<int>(static_cast<std::size_t>(parts), frame.pair_count()),
                      std::move(rows)};
   };
@@ -181,7 +193,7 @@ PackedLpca PackedLpca::with_half_angle(const Read& read, Communicator& ranks) co
         (gram.completeOrthogonalDecomposition().pseudoInverse() * own.cast<double>())
             .cast<float>());
   }
-  const RowRange own = rows_of_rank(frame_.texel_count(), ranks);
+  const RowRange own = rows_of_rank(pyramid().texel_count(), ranks);
   std::vector<Eigen::half> weights(static_cast<std::size_t>(own.count) *
                                    static_cast<std::size_t>(count));
   parallel_for(own.count, 16, [&](std::int64_t begin, std::int64_t end) {
@@ -274,27 +286,28 @@ void PackedLpca::fill_half_angles() {
 }
 
 Result<PackedLpca> PackedLpca::load(const SafetensorsFile& file,
-                                    DirectionRole beyond,
-                                    int colours,
-                                    bool separate,
-                                    bool half_angle) {
+                                    Layout layout,
+                                    bool with_mip_levels) {
   VENEER_ASSIGN(MaterialFrame frame, read_frame(file));
   VENEER_ASSIGN(const std::string text, file.meta("components"));
   const auto components = parse_two_terms(text, "a model of two terms");
   if (!components)
     return fail(Errc::kBadFormat, "reading {}: {}", file.path().string(), components.error().what);
-  Layout layout{*components, 0, beyond, colours, separate, half_angle};
+  layout.components = *components;
   VENEER_ASSIGN(layout.angular,
                 read_integer(file, "angular", FitOptions::kLeastAngular, FitOptions::kMostAngular));
-  VENEER_ASSIGN(LpcaFactors factors,
-                read_factors(file,
-                             frame.texel_count(),
-                             layout.components[0] + layout.components[1],
-                             frame.pair_count()));
+  layout.mip_levels = 1;
+  if (file.metadata().contains(kMipLevels)) {
+    const int most = with_mip_levels ? TexelPyramid::most_levels(frame.width, frame.height) : 1;
+    VENEER_ASSIGN(layout.mip_levels, read_integer(file, kMipLevels, 1, most));
+  }
+  const int texels = pyramid_of(frame, layout).texel_count();
+  VENEER_ASSIGN(
+      LpcaFactors factors,
+      read_factors(file, texels, layout.components[0] + layout.components[1], frame.pair_count()));
   std::vector<std::uint8_t> second_cluster;
-  if (separate) {
-    VENEER_ASSIGN(second_cluster,
-                  read_clusters(file, "second_clusters", frame.texel_count(), factors.clusters));
+  if (layout.separate) {
+    VENEER_ASSIGN(second_cluster, read_clusters(file, "second_clusters", texels, factors.clusters));
   }
   VENEER_TRY(check(frame,
                    layout,
@@ -308,10 +321,18 @@ void PackedLpca::add_to(Material::Contents& contents) const {
   add_frame(frame_, contents);
   contents.metadata["components"] = format_components(layout_.components);
   contents.metadata["angular"] = fmt::format("{}", layout_.angular);
-  add_factors(factors_, frame_.texel_count(), contents);
+  // One level is what files without this entry have.
+  if (layout_.mip_levels > 1) contents.metadata[kMipLevels] = fmt::format("{}", layout_.mip_levels);
+  const int texels = pyramid().texel_count();
+  add_factors(factors_, texels, contents);
   if (layout_.separate)
-    contents.tensors.push_back(
-        tensor_of("second_clusters", {frame_.texel_count()}, second_cluster_));
+    contents.tensors.push_back(tensor_of("second_clusters", {texels}, second_cluster_));
+}
+
+double PackedLpca::values_per_texel() const {
+  const int texels = pyramid().texel_count();
+  const int other = (layout_.separate ? 1 : 0) + 3 * layout_.colours;
+  return (factors_.values_per_texel(texels) + other) * (double(texels) / frame_.texel_count());
 }
 
 void PackedLpca::reconstruct(int texel, std::span<float> first, std::span<float> second) const {
@@ -361,7 +382,7 @@ ModelTexture PackedLpca::pack_texels(std::span<const Eigen::half> colours) const
   const auto count = static_cast<std::size_t>(3 * layout_.colours);
   const int cluster_lane = cluster_lane_of(layout_);
   const auto bits = [](Eigen::half h) { return Eigen::numext::bit_cast<std::uint16_t>(h); };
-  return texels_of(layout_).texture(frame_, [&](int texel, std::span<std::uint16_t> lanes) {
+  return texels_of(layout_).texture(pyramid(), [&](int texel, std::span<std::uint16_t> lanes) {
     const auto lane = static_cast<std::size_t>(cluster_lane);
     std::ranges::transform(factors_.weights_of(texel), lanes.begin(), bits);
     std::ranges::transform(colours.subspan(static_cast<std::size_t>(texel) * count, count),
@@ -393,16 +414,11 @@ ModelShader PackedLpca::shader(std::span<const Eigen::half> colours) const {
   const PackedTexels texels = texels_of(layout_);
   const auto lane = [](int index) { return PackedTexels::half_lane(index); };
 
-  std::string source = fmt::format(
-      "const ivec2 kTexels = ivec2({}, {});\n{}"
-      "uniform usampler2D PackedTexels;\n",
-      frame_.width,
-      frame_.height,
-      place_.constants());
+  std::string source =
+      fmt::format("{}{}uniform usampler2D PackedTexels;\n", pyramid().glsl(), place_.constants());
   for (int v = 0; v < volume_count(); ++v)
     source += fmt::format("uniform sampler3D Volume{};\n", v);
   source += kElevatedConcentricGlsl;
-  source += kTexelAtGlsl;
   source += kClusterVolumeGlsl;
   if (layout_.half_angle) source += half_place_.constants() + kHalfAngleGlsl;
 

@@ -9,6 +9,7 @@
 #include "btf/models/cluster_volume.h"
 #include "btf/models/half_angle.h"
 #include "btf/models/lpca_factors.h"
+#include "btf/texel_pyramid.h"
 
 namespace veneer::btf {
 
@@ -27,14 +28,16 @@ class PackedLpca {
  public:
   /// Components of the first and the second function.
   using Components = std::array<int, 2>;
-  /// Reads one texel's functions at every measured pair, [view][light]; thread-safe.
+  /// Reads the functions of one texel of the pyramid at every measured pair, [view][light];
+  /// thread-safe.
   using Read = std::function<void(int texel, std::span<float> first, std::span<float> second)>;
   /// What lights beyond the data do: kLight fades with the cosine, kView stays as at the border.
   struct Layout {
     Components components{};
     int angular = 16;
     DirectionRole beyond = DirectionRole::kLight;
-    int colours = 1;          ///< of a texel, 1 or 2
+    int colours = 1;  ///< of a texel, 1 or 2
+    int mip_levels = 1;
     bool separate = false;    ///< each function has clusters of its own
     bool half_angle = false;  ///< of the second function; fit() leaves that to with_half_angle()
   };
@@ -52,15 +55,18 @@ class PackedLpca {
                                               const Layout& layout,
                                               const Read& read,
                                               Progress& progress);
-  /// Reads what add_to() wrote, within the limits of fit(). Errors: kBadFormat.
+  /// Reads what add_to() wrote, within the limits of fit(). Errors: kBadFormat, also where the file
+  /// has mip levels and the model has not.
+  /// @param layout  components, angular and mip_levels are the file's, whatever it says of them.
   [[nodiscard]] static Result<PackedLpca> load(const SafetensorsFile& file,
-                                               DirectionRole beyond,
-                                               int colours,
-                                               bool separate = false,
-                                               bool half_angle = false);
+                                               Layout layout,
+                                               bool with_mip_levels = false);
   void add_to(Material::Contents& contents) const;
 
   [[nodiscard]] const MaterialFrame& frame() const { return frame_; }
+  /// The texels, with those of the mip levels, that functions below and colours are of. All levels
+  /// share their clusters.
+  [[nodiscard]] TexelPyramid pyramid() const { return pyramid_of(frame_, layout_); }
   [[nodiscard]] bool has_separate_clusters() const { return layout_.separate; }
   [[nodiscard]] bool has_half_angle() const { return layout_.half_angle; }
   [[nodiscard]] const Components& components() const { return layout_.components; }
@@ -68,13 +74,11 @@ class PackedLpca {
   /// and its weights found anew.
   /// @param read, ranks  as fit() had them.
   [[nodiscard]] PackedLpca with_half_angle(const Read& read, Communicator& ranks) const;
-  /// How far each function of texels evenly chosen is from what `read` gives, as drawn at the
-  /// measured pairs: root mean square.
+  /// How far each function of texels of the sample evenly chosen is from what `read` gives, as
+  /// drawn at the measured pairs: root mean square.
   [[nodiscard]] Eigen::Vector2d rmse(const Read& read) const;
-  /// As Material::values_per_texel(), without colours.
-  [[nodiscard]] double values_per_texel() const {
-    return factors_.values_per_texel(frame_.texel_count()) + (layout_.separate ? 1.0 : 0.0);
-  }
+  /// As Material::values_per_texel(). A texel of the sample counts for its share of mip levels.
+  [[nodiscard]] double values_per_texel() const;
   /// Both functions of a texel at every measured pair, from the factors.
   void reconstruct(int texel, std::span<float> first, std::span<float> second) const;
   /// Both functions as drawn, from the float16 volumes in double precision. The horizon is the
@@ -96,6 +100,7 @@ class PackedLpca {
              Layout layout,
              LpcaFactors factors,
              std::vector<std::uint8_t> second_cluster);
+  [[nodiscard]] static TexelPyramid pyramid_of(const MaterialFrame& frame, const Layout& layout);
   // Where a component stands: which volume, and which of its four channels.
   struct Slot {
     std::size_t volume;

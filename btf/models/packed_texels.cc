@@ -13,23 +13,30 @@ std::string uint_of(int index) {
 
 }  // namespace
 
-Status PackedTexels::check(const MaterialFrame& frame, Errc code, std::string_view doing) const {
-  return check_texture(
-      "the texels", static_cast<std::int64_t>(frame.width) * words_, frame.height, code, doing);
+Status PackedTexels::check(const TexelPyramid& pyramid, Errc code, std::string_view doing) const {
+  return check_texture("the texels",
+                       static_cast<std::int64_t>(pyramid.texture_width()) * words_,
+                       pyramid.texture_height(),
+                       code,
+                       doing);
 }
 
-ModelTexture PackedTexels::texture(
-    const MaterialFrame& frame,
-    const std::function<void(int texel, std::span<std::uint16_t> lanes)>& fill) const {
+ModelTexture PackedTexels::texture(const TexelPyramid& pyramid, const Fill& fill) const {
   ModelTexture texture{.sampler = "PackedTexels",
                        .kind = TextureKind::k2D,
                        .format = TexelFormat::kRgba32ui,
-                       .width = frame.width * words_,
-                       .height = frame.height};
+                       .width = pyramid.texture_width() * words_,
+                       .height = pyramid.texture_height()};
   const auto per_texel = static_cast<std::size_t>(words_) * kLanesPerWord;
-  std::vector<std::uint16_t> lanes(static_cast<std::size_t>(frame.texel_count()) * per_texel);
-  for (int texel = 0; texel < frame.texel_count(); ++texel)
-    fill(texel, std::span(lanes).subspan(static_cast<std::size_t>(texel) * per_texel, per_texel));
+  std::vector<std::uint16_t> lanes(static_cast<std::size_t>(pyramid.texture_width()) *
+                                   static_cast<std::size_t>(pyramid.texture_height()) * per_texel);
+  for (int texel = 0; texel < pyramid.texel_count(); ++texel) {
+    const auto [x, y] = pyramid.place(texel);
+    const auto at =
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(pyramid.texture_width()) +
+        static_cast<std::size_t>(x);
+    fill(texel, std::span(lanes).subspan(at * per_texel, per_texel));
+  }
   texture.data = texture_data(lanes);
   return texture;
 }

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "btf/models/material_tensors.h"
+#include "btf/texel_pyramid.h"
 
 namespace veneer::btf {
 
@@ -19,11 +20,16 @@ class PackedTexels {
   explicit PackedTexels(int lanes) : words_((lanes + kLanesPerWord - 1) / kLanesPerWord) {}
   [[nodiscard]] int words() const { return words_; }
   /// Refuses, with `code`, sizes that GPUs might not take.
-  [[nodiscard]] Status check(const MaterialFrame& frame, Errc code, std::string_view doing) const;
+  [[nodiscard]] Status check(const TexelPyramid& pyramid, Errc code, std::string_view doing) const;
+  [[nodiscard]] Status check(const MaterialFrame& frame, Errc code, std::string_view doing) const {
+    return check(TexelPyramid(frame.width, frame.height, 1), code, doing);
+  }
   /// The texture "PackedTexels". @param fill  writes the lanes of one texel, which are 0 before.
-  [[nodiscard]] ModelTexture texture(
-      const MaterialFrame& frame,
-      const std::function<void(int texel, std::span<std::uint16_t> lanes)>& fill) const;
+  using Fill = std::function<void(int texel, std::span<std::uint16_t> lanes)>;
+  [[nodiscard]] ModelTexture texture(const TexelPyramid& pyramid, const Fill& fill) const;
+  [[nodiscard]] ModelTexture texture(const MaterialFrame& frame, const Fill& fill) const {
+    return texture(TexelPyramid(frame.width, frame.height, 1), fill);
+  }
   /// GLSL: declares and fetches word0, word1, ... of the place `ivec2 texel`.
   [[nodiscard]] std::string fetch() const;
   /// GLSL: a lane that holds float16.

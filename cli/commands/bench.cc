@@ -29,6 +29,16 @@ Result<int> run_bench(CommandLine& line) {
   app.add_option("--material",
                  render.materials,
                  "render: time these materials, NAME.safetensors, in place of a fixed list");
+  app.add_option("--texels-per-pixel",
+                 render.texels_per_pixel,
+                 "render: how many texels fall along a pixel's side")
+      ->capture_default_str();
+  app.add_option("--rays",
+                 render.rays,
+                 "render: what is drawn is compared with the mean of so many rays along each side "
+                 "of a pixel; 1 is the texel at its centre")
+      ->capture_default_str();
+  app.add_flag("--average", render.average, "render: time each with averaged texels too");
   app.add_option("--cache",
                  render.cache.spacing,
                  "render: time each with an angular cache too, so many pixels between nodes");

@@ -61,22 +61,24 @@ constexpr std::array kCandidates{
     Candidate{"texel-colours", "6+2"},
 };
 
-/// A material, and once more with the cache where it offers one and one is asked for.
-void add(std::string name,
+/// A material, and once more in every way that it offers and that is asked for.
+void add(const std::string& name,
          const std::shared_ptr<const btf::Material>& material,
-         const render::AngularCacheOptions& cache,
+         const BenchRenderOptions& options,
          std::vector<render::RenderBenchMaterial>& materials) {
+  const bool cached = options.cache.spacing > 0 && material->shader().cache;
   materials.push_back({name, material});
-  if (cache.spacing > 0 && material->shader().cache)
-    materials.push_back({name + " cached", material, cache});
+  if (cached) materials.push_back({name + " cached", material, options.cache});
+  if (!options.average) return;
+  materials.push_back({name + " averaged", material, {}, true});
+  if (cached) materials.push_back({name + " averaged cached", material, options.cache, true});
 }
 
 /// Every model that the set allows at the sizes of the literature.
-Result<std::vector<render::RenderBenchMaterial>> fit_candidates(
-    const btf::SampleSet& set,
-    int iterations,
-    const render::AngularCacheOptions& cache,
-    Progress& progress) {
+Result<std::vector<render::RenderBenchMaterial>> fit_candidates(const btf::SampleSet& set,
+                                                                int iterations,
+                                                                const BenchRenderOptions& how,
+                                                                Progress& progress) {
   std::vector<render::RenderBenchMaterial> materials;
   for (const Candidate& candidate : kCandidates) {
     VENEER_ASSIGN(const btf::Model* model, btf::find_model(candidate.model));
@@ -88,7 +90,7 @@ Result<std::vector<render::RenderBenchMaterial>> fit_candidates(
     const std::shared_ptr<const btf::Material> material = std::move(fitted);
     std::string name(candidate.model);
     if (!candidate.components.empty()) name += fmt::format(" {}", candidate.components);
-    add(std::move(name), material, cache, materials);
+    add(name, material, how, materials);
   }
   return materials;
 }
@@ -149,6 +151,8 @@ void print(const render::RenderBenchResult& result, const std::string& size, Com
 Result<int> bench_render(const BenchRenderOptions& options, CommandLine& line) {
   render::RenderBenchOptions bench;
   bench.frames = options.frames;
+  bench.texels_per_pixel = options.texels_per_pixel;
+  bench.reference_rays = options.rays;
   if (char rest = 0;
       std::sscanf(options.size.c_str(), "%dx%d%c", &bench.width, &bench.height, &rest) != 2) {
     return fail(
@@ -157,7 +161,7 @@ Result<int> bench_render(const BenchRenderOptions& options, CommandLine& line) {
   VENEER_TRY(options.cache.check());
   for (const fs::path& file : options.materials) {
     VENEER_ASSIGN(std::unique_ptr<btf::Material> fitted, btf::load_material(file));
-    add(file.stem().string(), std::move(fitted), options.cache, bench.materials);
+    add(file.stem().string(), std::move(fitted), options, bench.materials);
   }
   std::optional<btf::InterpolatedSet> reference;
   if (!options.set.empty()) {
@@ -166,7 +170,7 @@ Result<int> bench_render(const BenchRenderOptions& options, CommandLine& line) {
     bench.reference = &*reference;
     if (bench.materials.empty()) {
       VENEER_ASSIGN(bench.materials,
-                    fit_candidates(reference->set(), kIterations, options.cache, line.progress()));
+                    fit_candidates(reference->set(), kIterations, options, line.progress()));
     }
   } else if (bench.materials.empty()) {
     std::error_code error;
@@ -177,8 +181,7 @@ Result<int> bench_render(const BenchRenderOptions& options, CommandLine& line) {
     const ScratchFolder scratch(temporary);
     VENEER_ASSIGN(const btf::SampleSet set,
                   synthesize_cloth(scratch.path() / "cloth.btfset", line.progress()));
-    VENEER_ASSIGN(bench.materials,
-                  fit_candidates(set, kRoughIterations, options.cache, line.progress()));
+    VENEER_ASSIGN(bench.materials, fit_candidates(set, kRoughIterations, options, line.progress()));
   }
   VENEER_ASSIGN(const render::RenderBenchResult result,
                 render::bench_render(bench, line.progress()));

@@ -18,6 +18,9 @@ struct BenchRenderOptions {
   /// What the list is fitted to and everything drawn is compared with; a small synthetic cloth, and
   /// no comparison, where it is empty.
   std::filesystem::path set;
+  double texels_per_pixel = 1.0;
+  int rays = 1;          ///< of the reference, along a pixel's side
+  bool average = false;  ///< times everything with averaged texels too
   /// With a spacing, whatever offers a cache is timed with it too.
   render::AngularCacheOptions cache;
 };

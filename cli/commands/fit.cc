@@ -126,6 +126,11 @@ Result<int> run_fit(CommandLine& line) {
   app.add_option("--precision", options.precision, "8bit or float16, for models that offer both");
   app.add_option("--angular", options.angular, "Nodes along each side of the direction square")
       ->capture_default_str();
+  app.add_option("--mip-levels",
+                 options.mip_levels,
+                 "The sample and halvings of it, for when several texels fall on a pixel; "
+                 "texel-colours")
+      ->capture_default_str();
   app.add_option("--iterations", options.iterations, "Rounds of clustering at most")
       ->capture_default_str();
   app.add_option("--fixed-view",

@@ -9,6 +9,7 @@ in Surface {
 layout(location = 0) out vec4 target;
 
 void main() {
+  uv_width = fwidth(surface.uv);
   vec3 normal = normalize(surface.normal);
   mat3 object_from_local = local_frame(normal, surface.tangent);
   vec3 view = view_at(surface.position) * object_from_local;

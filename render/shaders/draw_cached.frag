@@ -9,6 +9,7 @@ in Surface {
 layout(location = 0) out vec4 target;
 
 void main() {
+  uv_width = fwidth(surface.uv);
   cache_place = (gl_FragCoord.xy / kSpacing + kMargin + 0.5) / vec2(textureSize(CacheValues, 0).xy);
   vec3 rgb = vec3(0.0);
   for (int i = 0; i < LIGHT_COUNT; ++i) {

@@ -1,5 +1,7 @@
 // What a point of the surface knows of eye, lights and projector; everything in the object's frame.
 
+vec2 uv_width;  // how far the pixel reaches along u and v; main() says
+
 // A direction times this is in the local frame: z along the normal, x along the tangent.
 mat3 local_frame(vec3 normal, vec3 tangent) {
   vec3 x = normalize(tangent - dot(tangent, normal) * normal);

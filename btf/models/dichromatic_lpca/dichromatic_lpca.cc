@@ -197,7 +197,7 @@ class Dichromatic final : public Material {
     return shader;
   }
 
-  double values_per_texel() const override { return scalars_.values_per_texel() + 3 * kColours; }
+  double values_per_texel() const override { return scalars_.values_per_texel(); }
 
   Contents contents() const override {
     Contents contents;
@@ -314,6 +314,7 @@ Result<std::unique_ptr<Material>> fit_dichromatic_lpca(const SampleSet& set,
                                                        const FitOptions& options,
                                                        Progress& progress) {
   VENEER_TRY(options.check());
+  VENEER_TRY(refuse_mip_levels(options, kName));
   VENEER_TRY(refuse_precision(options, kName));
   VENEER_ASSIGN(const PackedLpca::Components components,
                 parse_two_terms(options.components, kName));
@@ -396,10 +397,10 @@ Result<std::unique_ptr<Material>> load_dichromatic_lpca(const SafetensorsFile& f
                 kSeparate);
   VENEER_ASSIGN(PackedLpca scalars,
                 PackedLpca::load(file,
-                                 beyond(terms.subtractive),
-                                 kColours,
-                                 clustering == kSeparate,
-                                 specular == kHalfAngle));
+                                 {.beyond = beyond(terms.subtractive),
+                                  .colours = kColours,
+                                  .separate = clustering == kSeparate,
+                                  .half_angle = specular == kHalfAngle}));
   const int texels = scalars.frame().texel_count();
   VENEER_ASSIGN(terms.masked_texels, read_integer(file, "masked_texels", 0, texels));
   for (const auto& [name, colour] : {std::pair{"specular_colour", &terms.specular_colour},

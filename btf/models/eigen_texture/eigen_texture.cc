@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "btf/models/components.h"
 #include "btf/models/direction_lookup.h"
 #include "btf/models/eigen_texture/eigen_images.h"
 
@@ -279,6 +280,7 @@ Result<std::unique_ptr<Material>> fit_eigen_texture(const SampleSet& set,
                                                     const FitOptions& options,
                                                     Progress& progress) {
   VENEER_TRY(options.check());
+  VENEER_TRY(refuse_mip_levels(options, kName));
   VENEER_TRY(refuse_form(options, kName));
   VENEER_ASSIGN(const int components, parse_one_term(options.components, kName));
   VENEER_ASSIGN(const Precision precision,

@@ -96,6 +96,7 @@ Result<std::unique_ptr<Material>> fit_lafortune(const SampleSet& set,
                                                 const FitOptions& options,
                                                 Progress& progress) {
   VENEER_TRY(options.check());
+  VENEER_TRY(refuse_mip_levels(options, kName));
   VENEER_TRY(refuse_form(options, kName));
   VENEER_TRY(refuse_precision(options, kName));
   MaterialFrame frame = frame_of(set.info());

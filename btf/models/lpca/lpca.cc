@@ -205,6 +205,7 @@ Result<std::unique_ptr<Material>> fit_lpca(const SampleSet& set,
                                            const FitOptions& options,
                                            Progress& progress) {
   VENEER_TRY(options.check());
+  VENEER_TRY(refuse_mip_levels(options, kName));
   VENEER_TRY(refuse_form(options, kName));
   VENEER_TRY(refuse_precision(options, kName));
   VENEER_ASSIGN(const int components, parse_one_term(options.components, kName));

@@ -306,6 +306,7 @@ Result<std::unique_ptr<Material>> fit_revised_lpca(const SampleSet& set,
                                                    const FitOptions& options,
                                                    Progress& progress) {
   VENEER_TRY(options.check());
+  VENEER_TRY(refuse_mip_levels(options, kName));
   VENEER_TRY(refuse_form(options, kName));
   Layout layout;
   VENEER_ASSIGN(layout.components, parse_one_term(options.components, kName));

@@ -51,6 +51,7 @@ class TexelColours final : public Material {
   std::string_view model() const override { return kName; }
   int width() const override { return scalars_.frame().width; }
   int height() const override { return scalars_.frame().height; }
+  int mip_levels() const override { return scalars_.pyramid().levels(); }
   const DirectionSet& views() const override { return scalars_.frame().views; }
   const DirectionSet& lights() const override { return scalars_.frame().lights; }
 
@@ -79,13 +80,13 @@ class TexelColours final : public Material {
     return shader;
   }
 
-  double values_per_texel() const override { return scalars_.values_per_texel() + 3 * kColours; }
+  double values_per_texel() const override { return scalars_.values_per_texel(); }
 
   Contents contents() const override {
     Contents contents;
     scalars_.add_to(contents);
     contents.tensors.push_back(
-        tensor_of("colours", {scalars_.frame().texel_count(), kColours, 3}, colours_));
+        tensor_of("colours", {scalars_.pyramid().texel_count(), kColours, 3}, colours_));
     return contents;
   }
 
@@ -109,19 +110,22 @@ Result<std::unique_ptr<Material>> fit_texel_colours(const SampleSet& set,
   VENEER_ASSIGN(const PackedLpca::Components components,
                 parse_two_terms(options.components, kName));
   const MaterialFrame frame = frame_of(set.info());
-  const PackedLpca::Layout layout{
-      .components = components, .angular = options.angular, .colours = kColours};
+  const PackedLpca::Layout layout{.components = components,
+                                  .angular = options.angular,
+                                  .colours = kColours,
+                                  .mip_levels = options.mip_levels};
   VENEER_TRY(PackedLpca::check(frame, layout, options.clusters, Errc::kInvalidOption, "fit"));
   VENEER_TRY(check_samples(set, options));
   const auto values = static_cast<std::size_t>(frame.pair_count()) * 3;
 
-  const RowRange own = rows_of_rank(frame.texel_count(), *options.ranks);
+  const TexelPyramid pyramid(frame.width, frame.height, options.mip_levels);
+  const RowRange own = rows_of_rank(pyramid.texel_count(), *options.ranks);
   progress.start("colours", own.count);
   std::vector<Eigen::half> colours(static_cast<std::size_t>(own.count) * kColours * 3);
   parallel_for(own.count, 16, [&](std::int64_t begin, std::int64_t end) {
     std::vector<float> rgb(values);
     for (auto i = static_cast<int>(begin); i < end; ++i) {
-      set.rgb(own.first + i, Part::kTotal, rgb);
+      pyramid_rgb(set, pyramid, own.first + i, Part::kTotal, rgb);
       Eigen::Map<HalfBasis>(colours.data() + 3 * kColours * i) =
           colour_basis(Samples(rgb.data(), frame.pair_count(), 3)).cast<Eigen::half>();
     }
@@ -132,7 +136,7 @@ Result<std::unique_ptr<Material>> fit_texel_colours(const SampleSet& set,
 
   const auto read = [&](int texel, std::span<float> first, std::span<float> second) {
     std::vector<float> rgb(values);
-    set.rgb(texel, Part::kTotal, rgb);
+    pyramid_rgb(set, pyramid, texel, Part::kTotal, rgb);
     const Samples samples(rgb.data(), frame.pair_count(), 3);
     const Basis basis =
         Eigen::Map<const HalfBasis>(colours.data() + 3 * kColours * texel).cast<float>();
@@ -144,9 +148,9 @@ Result<std::unique_ptr<Material>> fit_texel_colours(const SampleSet& set,
 }
 
 Result<std::unique_ptr<Material>> load_texel_colours(const SafetensorsFile& file) {
-  VENEER_ASSIGN(PackedLpca scalars, PackedLpca::load(file, DirectionRole::kLight, kColours));
+  VENEER_ASSIGN(PackedLpca scalars, PackedLpca::load(file, {.colours = kColours}, true));
   VENEER_ASSIGN(std::vector<Eigen::half> colours,
-                read_halves(file, "colours", {scalars.frame().texel_count(), kColours, 3}));
+                read_halves(file, "colours", {scalars.pyramid().texel_count(), kColours, 3}));
   return std::make_unique<TexelColours>(std::move(scalars), std::move(colours));
 }
 
