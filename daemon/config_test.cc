@@ -29,7 +29,8 @@ TEST(Config, ReadsEveryKey) {
   ASSERT_TRUE(
       read("clock = \"virtual\"\nframes = 12\nframe_rate_hz = 50\ndisplay_latency_ms = 30\n"
            "summary = \"s.json\"\n[render]\ncompensate = false\ndither = false\n"
-           "geometry_floor = 0.1\naverage_texels = true\ncache_spacing_px = 16\ncache_most_turn = "
+           "geometry_floor = 0.1\naverage_texels = true\nevaluation = "
+           "\"compute\"\ncache_spacing_px = 16\ncache_most_turn = "
            "0.2\n[prediction]\nhorizon_s = 0.1\n",
            &config));
   EXPECT_EQ(config.clock, ClockKind::kVirtual);
@@ -38,6 +39,7 @@ TEST(Config, ReadsEveryKey) {
   EXPECT_FALSE(config.render.compensate);
   EXPECT_EQ(config.render.geometry_floor, 0.1);
   EXPECT_TRUE(config.render.average_texels);
+  EXPECT_EQ(config.render.evaluation, render::Evaluation::kCompute);
   EXPECT_EQ(config.render.cache.spacing, 16);
   EXPECT_EQ(config.render.cache.most_turn, 0.2);
   EXPECT_EQ(config.prediction.horizon_s, 0.1);
@@ -53,6 +55,7 @@ TEST(Config, RefusesWhatMakesNoSense) {
                            "[render]\ngeometry_floor = 0",
                            "[render]\ncache_spacing_px = 2",
                            "[render]\ncompensation = true",
+                           "[render]\nevaluation = \"cpu\"",
                            "[prediction]\nhorizon_s = -1"}) {
     const Status status = read(line);
     ASSERT_FALSE(status) << line;

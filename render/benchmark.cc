@@ -127,10 +127,12 @@ class Bench {
         "plain",
         plain,
         DrawPass::create_plain(plain, kLight, bench.repeats(kPlainTexels, kPlainTexels), profile)));
-    for (const auto& [name, material, cache, average_texels] : options.materials) {
+    for (const auto& [name, material, cache, average_texels, evaluation] : options.materials) {
       const btf::ModelShader shader = material->shader();
       const Eigen::Vector2d repeats = bench.repeats(material->width(), material->height());
-      const DrawOptions draw{.cache = cache, .filter = texel_filter(*material, average_texels)};
+      const DrawOptions draw{.cache = cache,
+                             .filter = texel_filter(*material, average_texels),
+                             .evaluation = evaluation};
       VENEER_TRY(
           bench.add(name, shader, DrawPass::create(shader, {kLight}, repeats, profile, draw)));
     }
@@ -187,6 +189,8 @@ class Bench {
       entrant.timing.fetches = shader.cache->texel_fetches + shader.cache->layers;
       entrant.timing.gpu_bytes += cache->gpu_bytes();
     }
+    if (const SurfaceBuffer* surface = entrant.pass->surface())
+      entrant.timing.gpu_bytes += surface->gpu_bytes();
     return {};
   }
 

@@ -12,6 +12,7 @@
 #include "btf/interpolated_set.h"
 #include "btf/material.h"
 #include "render/angular_cache_options.h"
+#include "render/evaluation.h"
 
 namespace veneer::render {
 
@@ -21,6 +22,7 @@ struct RenderBenchMaterial {
       material;  ///< shared: the caller may time it in several runs
   AngularCacheOptions cache{};
   bool average_texels = false;  ///< as RendererOptions has it
+  Evaluation evaluation = Evaluation::kFragment;
 };
 
 struct RenderBenchOptions {
@@ -47,7 +49,7 @@ struct RenderTiming {
   double ms_p95 = 0;
   double ratio = 0;           ///< of the medians, to "plain"
   int fetches = 0;            ///< texture fetches per pixel and light
-  std::size_t gpu_bytes = 0;  ///< the cache included
+  std::size_t gpu_bytes = 0;  ///< the cache or the surface's points included
   /// The part of the triangles that are drawn from the angular cache; none where it is not used.
   std::optional<double> served{};
   /// Of what is drawn against the full set at the pixels' own directions (ScreenError), encoded.

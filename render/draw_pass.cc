@@ -122,9 +122,29 @@ Result<DrawPass> DrawPass::create(const btf::ModelShader& shader,
   VENEER_TRY(options.cache.check());
   const auto light_count = static_cast<int>(lights.size());
   DrawPass pass(std::move(lights), texture_repeats, profile);
+  if (options.evaluation == Evaluation::kCompute) {
+    VENEER_TRY(pass.link_compute(shader, options));
+    return pass;
+  }
   VENEER_TRY(pass.link(draw_fragment_source(shader.source, light_count, options.filter), shader));
   if (options.cache.spacing > 0 && shader.cache) VENEER_TRY(pass.add_cache(shader, options));
   return pass;
+}
+
+Status DrawPass::link_compute(const btf::ModelShader& shader, const DrawOptions& options) {
+  if (options.cache.spacing > 0)
+    return fail(Errc::kInvalidOption,
+                "evaluation in a compute pass does not use the angular cache; set its spacing to 0 "
+                "or evaluate in the fragment stage");
+  const auto light_count = static_cast<int>(lights_.size());
+  VENEER_ASSIGN(surface_, SurfaceBuffer::create(light_count, width_, height_));
+  VENEER_ASSIGN(program_,
+                link_program({{GL_COMPUTE_SHADER,
+                               "draw.comp",
+                               draw_compute_source(shader.source, light_count, options.filter)}}));
+  VENEER_ASSIGN(textures_, ModelTextures::upload(shader, program_.id()));
+  surface_->assign(program_.id(), static_cast<GLuint>(shader.textures.size()));
+  return {};
 }
 
 Status DrawPass::add_cache(const btf::ModelShader& shader, const DrawOptions& options) {
@@ -178,30 +198,39 @@ void DrawPass::draw(GLuint framebuffer, const MeshBuffers& mesh, const DrawInput
     cache_->fill(mesh, textures_, uniforms_.id(), node_uniforms_.id());
   }
 
-  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
   glViewport(0, 0, width_, height_);
   glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
   glDisable(GL_BLEND);
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_GREATER);
   glClearDepth(0.0);
+  if (surface_) {
+    surface_->begin();
+    use(surface_->program());
+    mesh.draw();
+    textures_.bind();
+    use(program_.id());
+    surface_->evaluate(framebuffer);
+    return;
+  }
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
   glClearColor(0.0F, 0.0F, 0.0F, 0.0F);
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   textures_.bind();
   if (cache_) {
     cache_->bind();
-    use(cached_program_);
+    use(cached_program_.id());
     mesh.draw_sorted(MeshBuffers::List::kCached);
-    use(program_);
+    use(program_.id());
     mesh.draw_sorted(MeshBuffers::List::kPerPixel);
   } else {
-    use(program_);
+    use(program_.id());
     mesh.draw();
   }
 }
 
-void DrawPass::use(const GlProgram& program) const {
-  glUseProgram(program.id());
+void DrawPass::use(GLuint program) const {
+  glUseProgram(program);
   glBindBufferBase(GL_UNIFORM_BUFFER, 0, uniforms_.id());
 }
 

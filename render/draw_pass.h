@@ -13,10 +13,12 @@
 #include "btf/model_shader.h"
 #include "calibration/profile.h"
 #include "render/angular_cache.h"
+#include "render/evaluation.h"
 #include "render/gl_objects.h"
 #include "render/mesh_buffers.h"
 #include "render/model_textures.h"
 #include "render/scene.h"
+#include "render/surface_buffer.h"
 #include "render/texel_filter.h"
 
 namespace veneer::render {
@@ -24,6 +26,7 @@ namespace veneer::render {
 struct DrawOptions {
   AngularCacheOptions cache{};
   TexelFilter filter{};
+  Evaluation evaluation = Evaluation::kFragment;
 };
 
 /// Clip coordinates from the projector's frame. Row 0 of the framebuffer is the first row of the
@@ -54,7 +57,8 @@ struct DrawInput {
 /// cd/m^2 and the geometric factor (surface.glsl). Needs a current context, always the same.
 class DrawPass {
  public:
-  /// Errors: kUnavailable (the driver refuses the shader, a texture is too large).
+  /// Errors: kUnavailable (the driver refuses the shader, a texture is too large), kInvalidOption
+  /// (the angular cache with evaluation in a compute pass).
   [[nodiscard]] static Result<DrawPass> create(const btf::ModelShader& shader,
                                                std::vector<Light> lights,
                                                const Eigen::Vector2d& texture_repeats,
@@ -65,21 +69,26 @@ class DrawPass {
                                                      const DirectionalLight& light,
                                                      const Eigen::Vector2d& texture_repeats,
                                                      const calibration::ProjectorProfile& profile);
-  /// Clears the framebuffer and draws. Sets all GL state that it needs.
+  /// Clears the framebuffer and draws. Sets all GL state that it needs. Evaluated in a compute
+  /// pass, only its colour is written, and its depth stays as it was.
   void draw(GLuint framebuffer, const MeshBuffers& mesh, const DrawInput& input) const;
   /// Null where every pixel is drawn by itself.
   [[nodiscard]] const AngularCache* cache() const { return cache_ ? &*cache_ : nullptr; }
+  /// Null where fragments are evaluated as they are drawn.
+  [[nodiscard]] const SurfaceBuffer* surface() const { return surface_ ? &*surface_ : nullptr; }
 
  private:
   DrawPass(std::vector<Light> lights,
            const Eigen::Vector2d& texture_repeats,
            const calibration::ProjectorProfile& profile);
   [[nodiscard]] Status link(const std::string& fragment_source, const btf::ModelShader& textures);
+  [[nodiscard]] Status link_compute(const btf::ModelShader& shader, const DrawOptions& options);
   [[nodiscard]] Status add_cache(const btf::ModelShader& shader, const DrawOptions& options);
-  void use(const GlProgram& program) const;
+  void use(GLuint program) const;
   GlProgram program_;
   ModelTextures textures_;
   GlBuffer uniforms_;
+  std::optional<SurfaceBuffer> surface_;  // where program_ is a compute program
   // The cache, the program that draws from it, and the uniforms with which its nodes are drawn.
   std::optional<AngularCache> cache_;
   GlProgram cached_program_;

@@ -69,7 +69,8 @@ class GlRenderer final : public Renderer {
                                                   const calibration::ProjectorProfile& profile,
                                                   const RendererOptions& options) {
     const DrawOptions draw_options{.cache = options.cache,
-                                   .filter = texel_filter(material, options.average_texels)};
+                                   .filter = texel_filter(material, options.average_texels),
+                                   .evaluation = options.evaluation};
     VENEER_ASSIGN(
         DrawPass draw,
         DrawPass::create(

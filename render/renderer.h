@@ -14,6 +14,7 @@
 #include "btf/material.h"
 #include "calibration/profile.h"
 #include "render/angular_cache_options.h"
+#include "render/evaluation.h"
 #include "render/scene.h"
 
 namespace veneer::render {
@@ -30,6 +31,8 @@ struct RendererOptions {
   /// texel at its centre: four evaluations, and no jagged edges between texels. Of materials with
   /// mip levels either is done on the level that suits the pixel's size.
   bool average_texels = false;
+  /// Compute goes without the angular cache.
+  Evaluation evaluation = Evaluation::kFragment;
 };
 
 /// What one frame needs to know.
@@ -57,7 +60,7 @@ struct FrameStatistics {
 /// object; bound to the thread that made it.
 class Renderer {
  public:
-  /// Errors: kUnavailable (no EGL, no GL 4.5; says what there is), kBadFormat.
+  /// Errors: kUnavailable (no EGL, no GL 4.5; says what there is), kBadFormat, kInvalidOption.
   [[nodiscard]] static Result<std::unique_ptr<Renderer>> create(
       const Scene& scene,
       const btf::Material& material,

@@ -207,40 +207,60 @@ TEST_F(RendererTest, ShowsTheFirstTexelAtTheUpperLeft) {
   });
 }
 
-// The weight reaches a material's shader, drawn per pixel or as the mean of texels.
+// The weight reaches a material's shader, drawn per pixel or as the mean of texels, in either
+// stage.
 TEST_F(RendererTest, FadesTheSpecularTerm) {
   const ShaderMaterial shiny("return vec3(0.2, 0.3, 0.1) + SPECULAR_WEIGHT * vec3(0.4);");
-  for (const bool average : {false, true}) {
-    const auto renderer = make(plate_scene(), shiny, {.average_texels = average});
-    for (const double weight : {1.0, 0.25, 0.0}) {
-      FrameInput input{{0, 0, 1}, {}, 0};
-      EXPECT_EQ(input.specular_weight, 1.0);
-      input.specular_weight = weight;
-      renderer->draw(input);
-      Image<Rgb32f> target(kWidth, kHeight);
-      renderer->read_target(target.view());
-      int covered = 0;
-      for (const Rgb32f& pixel : target.pixels()) {
-        if (pixel.norm() == 0) continue;
-        const Vector3d shown = srgb_from_xyz() * pixel.cast<double>();
-        const Vector3d wanted = Vector3d(0.2, 0.3, 0.1) + Vector3d::Constant(0.4 * weight);
-        ASSERT_LT((shown - wanted).norm(), kHalfFloatTolerance);
-        ++covered;
+  for (const Evaluation evaluation : {Evaluation::kFragment, Evaluation::kCompute})
+    for (const bool average : {false, true}) {
+      const auto renderer =
+          make(plate_scene(), shiny, {.average_texels = average, .evaluation = evaluation});
+      for (const double weight : {1.0, 0.25, 0.0}) {
+        FrameInput input{{0, 0, 1}, {}, 0};
+        EXPECT_EQ(input.specular_weight, 1.0);
+        input.specular_weight = weight;
+        renderer->draw(input);
+        Image<Rgb32f> target(kWidth, kHeight);
+        renderer->read_target(target.view());
+        int covered = 0;
+        for (const Rgb32f& pixel : target.pixels()) {
+          if (pixel.norm() == 0) continue;
+          const Vector3d shown = srgb_from_xyz() * pixel.cast<double>();
+          const Vector3d wanted = Vector3d(0.2, 0.3, 0.1) + Vector3d::Constant(0.4 * weight);
+          ASSERT_LT((shown - wanted).norm(), kHalfFloatTolerance);
+          ++covered;
+        }
+        EXPECT_GT(covered, 500);
       }
-      EXPECT_GT(covered, 500);
     }
-  }
+}
+
+TEST_F(RendererTest, RefusesTheAngularCacheInAComputePass) {
+  const auto renderer =
+      Renderer::create(plate_scene(),
+                       ShaderMaterial("return vec3(1.0);"),
+                       profile_,
+                       {.cache = {.spacing = 16}, .evaluation = Evaluation::kCompute});
+  ASSERT_FALSE(renderer);
+  EXPECT_EQ(renderer.error().code, Errc::kInvalidOption);
+  EXPECT_EQ(parse_evaluation("compute"), Evaluation::kCompute);
+  EXPECT_EQ(parse_evaluation("fragment"), Evaluation::kFragment);
+  for (const char* text : {"", "Compute", "compute "}) EXPECT_FALSE(parse_evaluation(text));
+}
+
+btf::ModelShader shader_of_levels() {
+  btf::ModelShader shader;
+  shader.source =
+      "int texel_level = 0;\n"
+      "vec3 btf_radiance(vec2 uv, vec3 view, vec3 light) { return vec3(texel_level + 1); }";
+  return shader;
 }
 
 // A material that shows which mip level is read.
 class LevelMaterial final : public ShaderMaterial {
  public:
   LevelMaterial(int side, int levels)
-      : ShaderMaterial(btf::ModelShader{
-            .source = "int texel_level = 0;\nvec3 btf_radiance(vec2 uv, vec3 view, vec3 light) { "
-                      "return vec3(texel_level + 1); }"}),
-        side_(side),
-        levels_(levels) {}
+      : ShaderMaterial(shader_of_levels()), side_(side), levels_(levels) {}
   [[nodiscard]] int width() const override { return side_; }
   [[nodiscard]] int height() const override { return side_; }
   [[nodiscard]] int mip_levels() const override { return levels_; }

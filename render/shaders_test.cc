@@ -21,6 +21,8 @@ TEST(Shaders, AreValidByTheReferenceCompiler) {
   for (const int lights : {1, kMaxLights}) {
     EXPECT_EQ(glslang_complaints(draw_vertex_source(lights), "vert"), "");
     EXPECT_EQ(glslang_complaints(draw_fragment_source(kAnyModel, lights), "frag"), "");
+    EXPECT_EQ(glslang_complaints(draw_compute_source(kAnyModel, lights), "comp"), "");
+    EXPECT_EQ(glslang_complaints(store_surface_fragment_source(lights), "frag"), "");
     const std::string with_levels = std::string("int texel_level = 0;\n") + kAnyModel;
     for (const bool average : {false, true})
       for (const int levels : {1, 2})

@@ -10,6 +10,7 @@ Result<int> run_bench(CommandLine& line) {
   std::string what;
   std::filesystem::path set;
   BenchRenderOptions render;
+  std::string evaluation = "fragment";
   std::string model_name = "lpca";
   btf::FitOptions fit;
   CLI::App& app = line.app();
@@ -39,6 +40,10 @@ Result<int> run_bench(CommandLine& line) {
                  "of a pixel; 1 is the texel at its centre")
       ->capture_default_str();
   app.add_flag("--average", render.average, "render: time each with averaged texels too");
+  app.add_option("--evaluation",
+                 evaluation,
+                 "render: compute times each evaluated in a compute pass too; fragment does not")
+      ->capture_default_str();
   app.add_option("--cache",
                  render.cache.spacing,
                  "render: time each with an angular cache too, so many pixels between nodes");
@@ -54,6 +59,7 @@ Result<int> run_bench(CommandLine& line) {
   line.parse();
   if (what == "render") {
     render.set = set;
+    VENEER_ASSIGN(render.evaluation, render::parse_evaluation(evaluation));
     return bench_render(render, line);
   }
   if (what == "query") return bench_query(line);

@@ -67,11 +67,16 @@ void add(const std::string& name,
          const BenchRenderOptions& options,
          std::vector<render::RenderBenchMaterial>& materials) {
   const bool cached = options.cache.spacing > 0 && material->shader().cache;
-  materials.push_back({name, material});
-  if (cached) materials.push_back({name + " cached", material, options.cache});
-  if (!options.average) return;
-  materials.push_back({name + " averaged", material, {}, true});
-  if (cached) materials.push_back({name + " averaged cached", material, options.cache, true});
+  const bool compute = options.evaluation == render::Evaluation::kCompute;
+  for (const bool average : {false, true}) {
+    if (average && !options.average) break;
+    const std::string shown = average ? name + " averaged" : name;
+    materials.push_back({shown, material, {}, average});
+    if (cached) materials.push_back({shown + " cached", material, options.cache, average});
+    if (compute)
+      materials.push_back(
+          {shown + " compute", material, {}, average, render::Evaluation::kCompute});
+  }
 }
 
 /// Every model that the set allows at the sizes of the literature.

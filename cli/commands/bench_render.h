@@ -7,6 +7,7 @@
 
 #include "cli/command_line.h"
 #include "render/angular_cache_options.h"
+#include "render/evaluation.h"
 
 namespace veneer::cli {
 
@@ -21,6 +22,8 @@ struct BenchRenderOptions {
   double texels_per_pixel = 1.0;
   int rays = 1;          ///< of the reference, along a pixel's side
   bool average = false;  ///< times everything with averaged texels too
+  /// kCompute times everything evaluated in a compute pass too.
+  render::Evaluation evaluation = render::Evaluation::kFragment;
   /// With a spacing, whatever offers a cache is timed with it too.
   render::AngularCacheOptions cache;
 };

@@ -18,6 +18,7 @@ Result<int> run_render(CommandLine& line) {
   std::vector<double> eye{0, 0, 1};
   render::RendererOptions options;
   bool uncompensated = false;
+  std::string evaluation = "fragment";
   CLI::App& app = line.app();
   app.add_option("scene", scene_path, "The scene, scene.toml")->required();
   app.add_option("--material", material_path, "The material, NAME.safetensors")->required();
@@ -32,6 +33,10 @@ Result<int> run_render(CommandLine& line) {
   app.add_flag("--average-texels",
                options.average_texels,
                "Show the mean of the texels under a pixel, not the one at its centre");
+  app.add_option("--evaluation",
+                 evaluation,
+                 "Where the material is evaluated: fragment, or compute over the visible pixels")
+      ->capture_default_str();
   app.add_option("--cache",
                  options.cache.spacing,
                  "Pixels between the nodes of the angular cache; 0 draws every pixel by itself")
@@ -46,6 +51,7 @@ Result<int> run_render(CommandLine& line) {
       ->required();
   line.parse();
   VENEER_TRY(options.cache.check());
+  VENEER_ASSIGN(options.evaluation, render::parse_evaluation(evaluation));
   if (out.extension() != ".png" && out.extension() != ".exr") {
     return fail(
         Errc::kInvalidOption, "writing {}: the name must end in .png or .exr", out.string());

@@ -1,4 +1,14 @@
-// Draws what the material would send to the eye.
+// Draws what the material would send to the eye. With IN_COMPUTE draw.comp stands behind it.
+#ifdef IN_COMPUTE
+struct Surface {
+  vec3 position;
+  vec3 normal;
+  vec3 tangent;
+  vec2 uv;
+};
+Surface surface;
+vec4 target;
+#else
 in Surface {
   vec3 position;
   vec3 normal;
@@ -7,9 +17,9 @@ in Surface {
 } surface;
 
 layout(location = 0) out vec4 target;
+#endif
 
-void main() {
-  uv_width = fwidth(surface.uv);
+void shade() {
   vec3 normal = normalize(surface.normal);
   mat3 object_from_local = local_frame(normal, surface.tangent);
   vec3 view = view_at(surface.position) * object_from_local;
@@ -22,3 +32,10 @@ void main() {
   }
   target = target_of(rgb, projector_geometry(normal, surface.position));
 }
+
+#ifndef IN_COMPUTE
+void main() {
+  uv_width = fwidth(surface.uv);
+  shade();
+}
+#endif
