@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "tracking/device/device_tracker.h"
+#include "tracking/drivers/polhemus/fastrak_protocol.h"
 #include "tracking/drivers/polhemus/polhemus_protocol.h"
 #include "tracking/transports/usb_bulk.h"
 
@@ -20,7 +22,7 @@ constexpr std::uint16_t kVendor = 0x0f44;
 struct Model {
   std::string_view key;   ///< in TOML
   std::string_view name;  ///< for people
-  PolhemusModel model;
+  std::unique_ptr<Protocol> (*make_protocol)();
   std::array<UsbModel, 2> usb;
 };
 
@@ -28,19 +30,35 @@ constexpr std::array<UsbPipe, 2> bulk_in(std::uint8_t endpoint) {
   return {{{endpoint, UsbPipe::Kind::kBulk}, {}}};
 }
 
+template <PolhemusModel kModel>
+std::unique_ptr<Protocol> make_tagged() {
+  return std::make_unique<PolhemusProtocol>(kModel);
+}
+
+std::unique_ptr<Protocol> make_fastrak() { return std::make_unique<FastrakProtocol>(); }
+
+/// It answers in bulk transfers, and sends continuous output in interrupt transfers.
+constexpr std::array<UsbPipe, 2> kFastrakIn{
+    {{0x82, UsbPipe::Kind::kBulk}, {0x84, UsbPipe::Kind::kInterrupt}}};
+
 /// High speed, which loads its firmware, and the full-speed ones before it.
 /// Source: numbers as in VRPN's and ROS's Polhemus drivers.
 constexpr std::array kModels{
     Model{"liberty",
           "LIBERTY",
-          PolhemusModel::kLiberty,
+          &make_tagged<PolhemusModel::kLiberty>,
           {{{"LIBERTY HS", {kVendor, 0xff20}, 0xff21, 0x04, bulk_in(0x88)},
             {"LIBERTY", {kVendor, 0xff12}, 0xff11, 0x02, bulk_in(0x82)}}}},
     Model{"patriot",
           "PATRIOT",
-          PolhemusModel::kPatriot,
+          &make_tagged<PolhemusModel::kPatriot>,
           {{{"PATRIOT HS", {kVendor, 0xef20}, 0xef21, 0x04, bulk_in(0x88)},
             {"PATRIOT", {kVendor, 0xef12}, 0xef11, 0x02, bulk_in(0x82)}}}},
+    Model{"fastrak",
+          "FASTRAK",
+          &make_fastrak,
+          {{{"FASTRAK", {kVendor, 0x0002}, 0x0001, 0x02, kFastrakIn},
+            {"FASTRAK", {kVendor, 0x0003}, 0x0001, 0x02, kFastrakIn}}}},
 };
 
 }  // namespace
@@ -53,8 +71,8 @@ Result<std::unique_ptr<Tracker>> open_polhemus(TomlReader& config, Clock& clock)
   const auto model = std::ranges::find(kModels, key, &Model::key);
   if (model == kModels.end()) {
     return fail(Errc::kInvalidOption,
-                "opening the Polhemus tracker: no model is called \"{}\"; set model to \"liberty\" "
-                "or \"patriot\"",
+                "opening the Polhemus tracker: no model is called \"{}\"; set model to "
+                "\"liberty\", \"patriot\" or \"fastrak\"",
                 key);
   }
   return std::make_unique<DeviceTracker>(
@@ -62,7 +80,7 @@ Result<std::unique_ptr<Tracker>> open_polhemus(TomlReader& config, Clock& clock)
                                     std::vector<UsbModel>(model->usb.begin(), model->usb.end()),
                                     std::move(identity),
                                     clock),
-      std::make_unique<PolhemusProtocol>(model->model),
+      model->make_protocol(),
       options,
       clock);
 }

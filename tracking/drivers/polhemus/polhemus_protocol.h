@@ -2,6 +2,7 @@
 #pragma once
 
 #include "tracking/device/protocol.h"
+#include "tracking/drivers/polhemus/internal_ascii.h"
 #include "tracking/drivers/polhemus/polhemus_frame.h"
 
 namespace veneer::tracking {
@@ -28,16 +29,13 @@ class PolhemusProtocol final : public Protocol {
   void feed(std::span<const std::byte> bytes,
             std::vector<RawSample>& samples,
             std::vector<std::byte>& reply) override;
-  [[nodiscard]] bool wants_restart() const override { return answers_in_text_; }
+  [[nodiscard]] bool wants_restart() const override { return text_.found(); }
   [[nodiscard]] ProtocolCounters counters() const override { return counters_; }
 
  private:
-  void skip_byte(std::byte byte);
-
   PolhemusModel model_;
   std::vector<std::byte> pending_;  // the beginning of a frame
-  int text_run_ = 0;                // readable bytes skipped in a row
-  bool answers_in_text_ = false;
+  TextRun text_;
   ProtocolCounters counters_;
 };
 
