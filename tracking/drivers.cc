@@ -24,9 +24,12 @@ Result<std::unique_ptr<Tracker>> open_as_tracker(TomlReader& config, Clock& cloc
 
 constexpr std::array kDrivers{
     Driver{"freed", "camera trackers and robotic heads that send FreeD by UDP", &open_freed},
-    Driver{"osvr-hdk", "OSVR HDK: where a head looks", &open_osvr_hdk},
-    Driver{"polhemus", "Polhemus LIBERTY, PATRIOT or FASTRAK, over USB", &open_polhemus},
-    Driver{"razer-hydra", "Razer Hydra: two controllers", &open_razer_hydra},
+    Driver{"osvr-hdk", "OSVR HDK: where a head looks", &open_osvr_hdk, &osvr_hdk_on_usb},
+    Driver{"polhemus",
+           "Polhemus LIBERTY, PATRIOT or FASTRAK, over USB",
+           &open_polhemus,
+           &polhemus_on_usb},
+    Driver{"razer-hydra", "Razer Hydra: two controllers", &open_razer_hydra, &razer_hydra_on_usb},
     Driver{"replay", "a recording, at its own pace", &open_as_tracker<ReplayTracker>},
     Driver{"simulated", "bodies on scripted paths", &open_as_tracker<SimulatedTracker>},
     Driver{"simulated-device",

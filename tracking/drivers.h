@@ -4,11 +4,13 @@
 #include <memory>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "base/clock.h"
 #include "base/result.h"
 #include "base/toml_reader.h"
 #include "tracking/tracker.h"
+#include "tracking/usb_devices.h"
 
 namespace veneer::tracking {
 
@@ -20,6 +22,8 @@ struct Driver {
   /// @param clock   borrowed; must outlive the tracker.
   /// Errors: kNotFound, kBadFormat, kInvalidOption.
   Result<std::unique_ptr<Tracker>> (*open)(TomlReader& config, Clock& clock);
+  /// How the devices of this driver show on USB; null where it has none there.
+  std::vector<UsbAppearance> (*on_usb)() = nullptr;
 };
 
 /// Every driver, sorted by name.

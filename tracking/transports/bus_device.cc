@@ -167,4 +167,15 @@ Error open_error(const std::string& name, const BusDevice& device, int error) {
   }
 }
 
+Error firmware_error(const std::string& name, const BusDevice& device) {
+  return {Errc::kUnavailable,
+          fmt::format(
+              "opening {}: it is there on usb port {} as {}, which means that it needs firmware; "
+              "install fxload and the maker's firmware with the udev rule that loads it, then plug "
+              "it out and in again (docs/howto/tracker.md)",
+              name,
+              device.usb_port,
+              text_of(device.id))};
+}
+
 }  // namespace veneer::tracking

@@ -70,5 +70,7 @@ class UsbIdentity {
 [[nodiscard]] std::string identity_text(const BusDevice& device);
 /// Why a device that is there could not be opened, and what to do; `error` is an errno.
 [[nodiscard]] Error open_error(const std::string& name, const BusDevice& device, int error);
+/// That it waits for its firmware, and what loads it.
+[[nodiscard]] Error firmware_error(const std::string& name, const BusDevice& device);
 
 }  // namespace veneer::tracking

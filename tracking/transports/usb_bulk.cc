@@ -58,13 +58,7 @@ Result<std::unique_ptr<Transport>> UsbBulkPort::open() {
     });
     if (chosen.error().code != Errc::kNotFound || bare == devices.end())
       return tl::unexpected<Error>(chosen.error());
-    return fail(Errc::kUnavailable,
-                "opening {}: it is there on usb port {} as {}, which means that it needs firmware; "
-                "install fxload and the maker's firmware with the udev rule that loads it, then "
-                "plug it out and in again (docs/howto/tracker.md)",
-                name_,
-                bare->usb_port,
-                text_of(bare->id));
+    return tl::unexpected<Error>(firmware_error(name_, *bare));
   }
   const UsbModel& model = *model_of(chosen->id);
   VENEER_ASSIGN(std::unique_ptr<Transport> transport,

@@ -58,7 +58,7 @@ constexpr std::array kModels{
           "FASTRAK",
           &make_fastrak,
           {{{"FASTRAK", {kVendor, 0x0002}, 0x0001, 0x02, kFastrakIn},
-            {"FASTRAK", {kVendor, 0x0003}, 0x0001, 0x02, kFastrakIn}}}},
+            {"FASTRAK", {kVendor, 0x0003}, 0, 0x02, kFastrakIn}}}},
 };
 
 }  // namespace
@@ -83,6 +83,19 @@ Result<std::unique_ptr<Tracker>> open_polhemus(TomlReader& config, Clock& clock)
       model->make_protocol(),
       options,
       clock);
+}
+
+std::vector<UsbAppearance> polhemus_on_usb() {
+  std::vector<UsbAppearance> result;
+  for (const Model& model : kModels) {
+    for (const UsbModel& usb : model.usb) {
+      const std::string name = fmt::format("Polhemus {}", usb.name);
+      result.push_back({name, usb.id, DeviceClass::kUsb, false});
+      const UsbId boot{usb.id.vendor, usb.boot_product};
+      if (usb.boot_product != 0) result.push_back({name, boot, DeviceClass::kUsb, true});
+    }
+  }
+  return result;
 }
 
 }  // namespace veneer::tracking

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tracking/drivers/razer_hydra/razer_hydra.h"
 
+#include <string>
+#include <string_view>
+
 #include "tracking/device/device_tracker.h"
 #include "tracking/drivers/razer_hydra/razer_hydra_protocol.h"
 #include "tracking/transports/hid.h"
@@ -8,6 +11,7 @@
 namespace veneer::tracking {
 namespace {
 
+constexpr std::string_view kName = "Razer Hydra";
 /// Motion comes on interface 0; interface 1 is told to send it.
 const HidModel kModel{{{0x1532, 0x0300}}, 0, 1};
 
@@ -22,10 +26,17 @@ Result<std::unique_ptr<Tracker>> open_razer_hydra(TomlReader& config, Clock& clo
   if (hemisphere && !(hemisphere->norm() > 0 && hemisphere->allFinite()))
     config.add_error("hemisphere", "no direction; choose one such as [0, 0, 1]");
   return std::make_unique<DeviceTracker>(
-      std::make_unique<HidPort>("Razer Hydra", kModel, std::move(identity), clock),
+      std::make_unique<HidPort>(std::string(kName), kModel, std::move(identity), clock),
       std::make_unique<RazerHydraProtocol>(hemisphere),
       options,
       clock);
+}
+
+std::vector<UsbAppearance> razer_hydra_on_usb() {
+  std::vector<UsbAppearance> result;
+  for (const UsbId id : kModel.ids)
+    result.push_back({std::string(kName), id, DeviceClass::kHidraw, false});
+  return result;
 }
 
 }  // namespace veneer::tracking

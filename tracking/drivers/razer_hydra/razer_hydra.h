@@ -2,16 +2,20 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "base/clock.h"
 #include "base/result.h"
 #include "base/toml_reader.h"
 #include "tracking/tracker.h"
+#include "tracking/usb_devices.h"
 
 namespace veneer::tracking {
 
 /// Keys: serial, usb_port, hemisphere, and those of DeviceTrackerOptions.
 /// @param clock  borrowed; must outlive the tracker.
 [[nodiscard]] Result<std::unique_ptr<Tracker>> open_razer_hydra(TomlReader& config, Clock& clock);
+/// How it shows on USB.
+[[nodiscard]] std::vector<UsbAppearance> razer_hydra_on_usb();
 
 }  // namespace veneer::tracking
