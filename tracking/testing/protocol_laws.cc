@@ -33,9 +33,14 @@ std::string difference(const Understanding& a, const Understanding& b) {
   return {};
 }
 
-std::string broken_bound(const Protocol& protocol, const Understanding& got, std::size_t size) {
+/// @param size    of all that came.
+/// @param pieces  messages that came; an empty one may be a bad frame as well. 0 for a stream.
+std::string broken_bound(const Protocol& protocol,
+                         const Understanding& got,
+                         std::size_t size,
+                         std::size_t pieces) {
   if (got.counters.skipped_bytes > size) return "more skipped than came";
-  if (got.counters.bad_frames > size) return "more bad frames than bytes";
+  if (got.counters.bad_frames > size + pieces) return "more bad frames than came";
   if (got.samples.size() > size) return "more samples than bytes";
   if (got.reply.size() > size) return "more answered than asked";
   const bool ticks = protocol.clock().has_value();
@@ -93,7 +98,8 @@ std::string broken_law(const MakeProtocol& make, Framing framing, Pieces pieces,
 
   const std::unique_ptr<Protocol> protocol = make();
   const Understanding first = understand(*protocol, stream ? whole : pieces);
-  if (std::string law = broken_bound(*protocol, first, all.size()); !law.empty()) return law;
+  std::string law = broken_bound(*protocol, first, all.size(), stream ? 0 : pieces.size());
+  if (!law.empty()) return law;
   if (stream) {
     const std::size_t at = all.empty() ? 0 : cut % all.size();
     const std::vector<std::span<const std::byte>> halves{std::span(all).first(at),
