@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tracking/usb_access.h"
 
-#include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -96,7 +95,7 @@ Status check_access(const UsbDevice& device, const SystemFolders& folders) {
   for (const fs::path& node : nodes) {
     BusDevice opened = bus_device;
     opened.node = node.string();
-    if (::faccessat(AT_FDCWD, node.c_str(), R_OK | W_OK, AT_EACCESS) != 0)
+    if (::access(node.c_str(), R_OK | W_OK) != 0)
       return tl::unexpected<Error>(open_error(device.model, opened, errno));
     // Several may have a HID device open; a transfer interface belongs to one.
     if (device.device_class == DeviceClass::kHidraw) continue;

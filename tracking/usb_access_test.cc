@@ -24,10 +24,10 @@ class AsNobody {
   AsNobody() : self_(::geteuid()) {
     constexpr uid_t kNobody = 65534;
     if (self_ == 0) {
-      EXPECT_EQ(::seteuid(kNobody), 0);
+      EXPECT_EQ(::setresuid(kNobody, kNobody, self_), 0);
     }
   }
-  ~AsNobody() { EXPECT_EQ(::seteuid(self_), 0); }
+  ~AsNobody() { EXPECT_EQ(::setresuid(self_, self_, self_), 0); }
   AsNobody(const AsNobody&) = delete;
   AsNobody& operator=(const AsNobody&) = delete;
 

@@ -19,6 +19,7 @@
 #include "tracking/drivers/polhemus/fastrak_protocol.h"
 #include "tracking/testing/mock_hidraw.h"
 #include "tracking/testing/mock_liberty.h"
+#include "tracking/usb_access.h"
 
 // Drivers as the daemon opens them, the real libusb and hidapi below them, on a mocked bus. Times
 // here are real, so that limits on them are loose.
@@ -113,6 +114,21 @@ TEST_F(LibertyOnTheBus, IsWaitedForWhileAbsent) {
   const Time plugged = clock_.now();
   ASSERT_TRUE(tracks());
   EXPECT_LE(clock_.now() - plugged, seconds(2)) << "the arrival ends the wait";
+}
+
+TEST_F(LibertyOnTheBus, IsFoundByWhoLooksForTrackersWithoutOpeningIt) {
+  EXPECT_TRUE(usb_devices().empty());
+  liberty_.plug();
+  const std::vector<UsbDevice> devices = usb_devices();
+  ASSERT_EQ(devices.size(), 1U);
+  EXPECT_EQ(devices[0].driver, "polhemus");
+  EXPECT_EQ(devices[0].serial, "L1");
+  EXPECT_EQ(devices[0].port, "1-1");
+  const Status access = check_access(devices[0]);
+  EXPECT_TRUE(access) << access.error().what;
+  EXPECT_EQ(liberty_.usb().openers(), 0);
+  liberty_.unplug();
+  ASSERT_FALSE(check_access(devices[0])) << "it went away meanwhile";
 }
 
 TEST_F(LibertyOnTheBus, UnplugIsToldAndReplugTakesItUpAgain) {
