@@ -30,12 +30,8 @@ Trackers look_at_trackers() {
                            {"port", device.port},
                            {"usable", access.has_value()},
                            {"problem", problem}});
-    result.text += fmt::format("\ntracker  {}{} on usb port {}{}{}",
-                               access ? "" : "not usable: ",
-                               device.model,
-                               device.port,
-                               access ? "" : ": ",
-                               problem);
+    result.text += access ? fmt::format("\ntracker  {} on usb port {}", device.model, device.port)
+                          : fmt::format("\ntracker  not usable: {}", problem);
     result.all_usable = result.all_usable && access.has_value();
   }
   if (result.text.empty()) result.text = "\ntracker  none on USB";
