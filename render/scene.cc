@@ -75,6 +75,47 @@ void read_object(TomlReader toml, Scene& scene) {
     toml.add_error("tracker_body", "must be a body's number, or -1 for none");
 }
 
+/// The eye by itself, or `eye` and the eyes of which it chooses.
+Eigen::Vector3d read_eye(TomlReader& toml) {
+  constexpr std::string_view kLeft = "left_eye_in_sensor";
+  constexpr std::string_view kRight = "right_eye_in_sensor";
+  const auto point = [&](std::string_view key) {
+    Eigen::Vector3d value = Eigen::Vector3d::Zero();
+    toml.read(key, value);
+    if (!value.allFinite()) toml.add_error(key, "must be finite");
+    return value;
+  };
+  std::string eye;
+  toml.read("eye", eye);
+  const Eigen::Vector3d single = point("eye_in_sensor");
+  const Eigen::Vector3d left = point(kLeft);
+  const Eigen::Vector3d right = point(kRight);
+  if (!toml.contains("eye")) {
+    for (const std::string_view key : {kLeft, kRight}) {
+      if (toml.contains(key))
+        toml.add_error(key, "say which eye is meant: eye = \"left\", \"right\" or \"midpoint\"");
+    }
+    return single;
+  }
+  if (eye != "left" && eye != "right" && eye != "midpoint") {
+    toml.add_error("eye", "must be \"left\", \"right\" or \"midpoint\"");
+    return single;
+  }
+  if (toml.contains("eye_in_sensor")) {
+    toml.add_error("eye_in_sensor",
+                   fmt::format("stands beside eye = \"{}\", which takes left_eye_in_sensor and "
+                               "right_eye_in_sensor; remove one of the two",
+                               eye));
+  }
+  for (const std::string_view key : {kLeft, kRight}) {
+    const bool needed = eye == "midpoint" || key.substr(0, eye.size()) == eye;
+    if (needed && !toml.contains(key))
+      toml.add_error("eye", fmt::format("is \"{}\", and {} is missing", eye, key));
+  }
+  if (eye == "midpoint") return 0.5 * (left + right);
+  return eye == "left" ? left : right;
+}
+
 void read_observer(TomlReader toml, Scene& scene) {
   const bool several = toml.contains("tracker_bodies");
   const std::string_view key = several ? "tracker_bodies" : "tracker_body";
@@ -90,8 +131,7 @@ void read_observer(TomlReader toml, Scene& scene) {
   for (const int body : scene.observer_bodies) {
     if (body < 0) toml.add_error(key, "must be bodies' numbers, 0 or more");
   }
-  toml.read("eye_in_sensor", scene.eye_in_sensor);
-  if (!scene.eye_in_sensor.allFinite()) toml.add_error("eye_in_sensor", "must be finite");
+  scene.eye_in_sensor = read_eye(toml);
 }
 
 }  // namespace

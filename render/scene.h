@@ -36,7 +36,10 @@ using Light = std::variant<DirectionalLight, PointLight>;
 ///     tracker_body = -1              # >= 0: the pose comes from the tracker instead
 ///     [observer]
 ///     tracker_body = 0               # or tracker_bodies = [1, 2]: whoever is seen
-///     eye_in_sensor = [0.0, 0.0, 0.0]  # metres in the body's frame
+///     eye_in_sensor = [0.0, 0.0, 0.0]  # metres in the body's frame; or, where both were measured:
+///     # eye = "left"                 # "left", "right" or "midpoint": for which eye is drawn
+///     # left_eye_in_sensor = [-0.03, 0.0, 0.0]
+///     # right_eye_in_sensor = [0.03, 0.0, 0.0]
 ///     [[light]]                      # one or more; at most 4
 ///     kind = "directional"           # or "point"
 ///     direction = [0.3, 0.5, 0.8]    # to the light, or position = [...] for a point
@@ -49,6 +52,7 @@ struct Scene {
   RigidTransform world_from_object;
   int object_body = -1;
   std::vector<int> observer_bodies{0};
+  /// The point for which is drawn, whichever keys say it.
   Eigen::Vector3d eye_in_sensor = Eigen::Vector3d::Zero();
   std::vector<Light> lights;
 

@@ -102,6 +102,36 @@ TEST_F(SceneTest, RefusesWhatItDoesNotKnow) {
   expect_refused(plate + "[object]\ntracker_body = -2\n" + kLight, {"tracker_body"});
 }
 
+TEST_F(SceneTest, OneEyeOrTheMiddleOfTwo) {
+  const std::string plate = "mesh = \"plate\"\n[observer]\n";
+  const std::string left = "left_eye_in_sensor = [-0.03, 0.01, 0]\n";
+  const std::string right = "right_eye_in_sensor = [0.04, 0.03, 0.02]\n";
+  const auto eye_of = [&](const std::string& keys) {
+    const auto scene = load(plate + keys + kLight);
+    EXPECT_TRUE(scene) << scene.error().what;
+    return scene ? scene->eye_in_sensor : Vector3d(9, 9, 9);
+  };
+  EXPECT_EQ(eye_of("eye = \"left\"\n" + left + right), Vector3d(-0.03, 0.01, 0));
+  EXPECT_EQ(eye_of("eye = \"right\"\n" + left + right), Vector3d(0.04, 0.03, 0.02));
+  EXPECT_LT((eye_of("eye = \"midpoint\"\n" + left + right) - Vector3d(0.005, 0.02, 0.01)).norm(),
+            1e-15);
+  EXPECT_EQ(eye_of("eye = \"left\"\n" + left), Vector3d(-0.03, 0.01, 0)) << "needs no other";
+  EXPECT_EQ(eye_of("eye_in_sensor = [1, 2, 3]\n"), Vector3d(1, 2, 3));
+  EXPECT_EQ(eye_of(""), Vector3d(0, 0, 0));
+
+  const std::string one = "eye_in_sensor = [0, 0, 0]\n";
+  expect_refused(plate + "eye = \"middle\"\n" + left + right + kLight, {"eye", "midpoint"});
+  expect_refused(plate + "eye = \"midpoint\"\n" + left + kLight,
+                 {"right_eye_in_sensor", "missing"});
+  expect_refused(plate + "eye = \"left\"\n" + right + kLight, {"left_eye_in_sensor", "missing"});
+  expect_refused(plate + "eye = \"left\"\n" + left + one + kLight, {"eye_in_sensor", "remove"});
+  expect_refused(plate + "eye = \"left\"\n" + one + kLight, {"left_eye_in_sensor", "missing"});
+  expect_refused(plate + left + kLight, {"which eye", "midpoint"});
+  expect_refused(plate + one + right + kLight, {"which eye"});
+  expect_refused(plate + "eye = \"right\"\nright_eye_in_sensor = [0, nan, 0]\n" + kLight,
+                 {"right_eye_in_sensor", "finite"});
+}
+
 TEST_F(SceneTest, SaysThatTheMeshIsMissing) {
   const auto scene = load(std::string("mesh = \"teapot.obj\"\n") + kLight);
   ASSERT_FALSE(scene);
