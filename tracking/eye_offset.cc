@@ -76,8 +76,8 @@ Pivot fit(const std::vector<Pose>& poses, std::size_t left_out = kParts) {
 /// Marks the poses that do not fit the others with a weight of 0, all others with 1.
 void drop_outliers(std::vector<Pose>& poses) {
   // The least sum of distances first, which gross outliers hardly move, by least squares whose
-  // weights are one over the distance. Source: Weiszfeld 1937, as in Chartrand and Yin 2008,
-  // "Iteratively reweighted algorithms for compressive sensing".
+  // weights are one over the distance. Source: Chartrand and Yin 2008, "Iteratively Reweighted
+  // Algorithms for Compressive Sensing", for p = 1.
   constexpr int kRounds = 30;
   constexpr double kNear_m = 1e-5;  // nearer than any tracker can tell
   for (int round = 0; round < kRounds; ++round) {

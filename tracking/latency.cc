@@ -233,7 +233,10 @@ class Search {
 };
 
 bool convincing(const Latency& latency) {
-  return latency.worst_residual >= LatencyLimits{}.least_contrast * latency.residual;
+  const LatencyLimits limits;
+  const bool by_position = latency.signal == MotionSignal::kPosition;
+  return latency.worst_residual >= limits.least_contrast * latency.residual &&
+         latency.worst_residual >= (by_position ? limits.least_move_m : limits.least_turn_rad);
 }
 
 }  // namespace
@@ -285,6 +288,18 @@ Status check(const Latency& latency, const LatencyLimits& limits) {
                 kDoing,
                 latency.seconds,
                 limits.least_seconds);
+  }
+  const bool by_position = latency.signal == MotionSignal::kPosition;
+  const double least = by_position ? limits.least_move_m : limits.least_turn_rad;
+  if (!(latency.worst_residual >= least)) {
+    return fail(Errc::kUnavailable,
+                "{}: even the worst latency leaves only {:.2g} {} between the motions, at least "
+                "{:g} are needed; move the thing fast and unevenly, to and fro and about several "
+                "axes",
+                kDoing,
+                latency.worst_residual,
+                by_position ? "m" : "rad",
+                least);
   }
   if (!(latency.worst_residual >= limits.least_contrast * latency.residual)) {
     return fail(Errc::kUnavailable,

@@ -44,6 +44,9 @@ struct LatencyLimits {
   double most_deviation_s = 0.0005;
   /// Below it neither position nor rotation moved enough to tell.
   double least_contrast = 3;  ///< worst_residual / residual
+  /// worst_residual, too, lest rounding and small wobbles pass for motion where there is no noise.
+  double least_move_m = 0.005;
+  double least_turn_rad = 0.02;
   /// A rival that fits less than so many times worse may be the true one.
   double least_rival = 1.5;
   double least_seconds = 3;

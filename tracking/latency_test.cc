@@ -177,6 +177,19 @@ TEST(MeasuredLatency, TooLittleMotionIsRefused) {
                       "move the thing fast"));
 }
 
+TEST(MeasuredLatency, WithoutNoiseItIsNotKnownBetter) {
+  const Source exact{.position_mm = 0, .rotation_deg = 0};
+  EXPECT_TRUE(refused(measured(exact, exact, [](double) { return RigidTransform{}; }),
+                      "move the thing fast"));
+  EXPECT_TRUE(refused(measured(exact,
+                               exact,
+                               [](double t) {
+                                 const Eigen::Quaterniond turned = turn({0, 0, 2 * t});
+                                 return RigidTransform{turned, turned * Vector3d(0.5, 0, 0)};
+                               }),
+                      "unevenly"));
+}
+
 TEST(MeasuredLatency, EvenTurningTellsNothing) {
   // A moment later it is the same but for a turn.
   EXPECT_TRUE(refused(measured({.latency_s = 0.02},
@@ -207,6 +220,19 @@ TEST(MeasuredLatency, AnotherMotionIsRefused) {
   EXPECT_FALSE(check(measure_latency(tracker, other, {}).value(), {}));
   // The same one, farther off than is looked for.
   EXPECT_FALSE(check(measured({.latency_s = 0.3}, kReference).value(), {}));
+}
+
+TEST(MeasuredLatency, AMirrorImageIsAnotherMotion) {
+  const Motion moving = [](double t) {
+    return RigidTransform{Eigen::Quaterniond::Identity(), waving(t).translation};
+  };
+  const PoseHistory tracker = Source{}.seen(moving, 1);
+  PoseHistory mirrored;
+  for (PoseSample sample : tracker.samples()) {
+    sample.world_from_body.translation.x() *= -1;
+    mirrored.add(sample);
+  }
+  EXPECT_FALSE(check(measure_latency(mirrored, kReference.seen(moving, 2), {}).value(), {}));
 }
 
 TEST(MeasuredLatency, RecordingsOfDifferentTimesAreAnError) {

@@ -21,7 +21,8 @@ class PoseHistory {
   /// was not measured after the one before. Returns whether it was taken.
   bool add(const PoseSample& sample);
 
-  [[nodiscard]] const std::vector<PoseSample>& samples() const { return samples_; }
+  [[nodiscard]] const std::vector<PoseSample>& samples() const& { return samples_; }
+  void samples() const&& = delete;  // they would be gone
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
 
   /// The straight line through the samples around a moment, at that moment.
@@ -41,7 +42,8 @@ class PoseHistory {
   /// wherever the moment lies between samples: nothing draws a shift of time to one phase.
   /// Nothing where fewer than four samples or samples of several epochs lie within, or all of them
   /// on one side of the moment.
-  /// Source: Cleveland 1979, "Robust Locally Weighted Regression and Smoothing Scatterplots".
+  /// Source: Cleveland 1979, "Robust Locally Weighted Regression and Smoothing Scatterplots", with
+  /// his other weights in place of the tricube.
   [[nodiscard]] std::optional<LocalFit> fit_at(Time when, Duration half_width) const;
 
  private:
