@@ -6,11 +6,17 @@
 #include <nlohmann/json.hpp>
 
 #include <chrono>
+#include <cmath>
 #include <csignal>
+#include <string>
 #include <thread>
+#include <vector>
 
+#include "base/clock.h"
+#include "base/toml_reader.h"
 #include "tests/program.h"
 #include "tracking/drivers.h"
+#include "tracking/recording.h"
 
 namespace veneer {
 namespace {
@@ -136,6 +142,134 @@ TEST_F(TrackTest, GapsOfARecordingAreTold) {
   EXPECT_EQ(parsed.at("bodies").at(0).at("lost"), 4);
   EXPECT_NEAR(parsed.at("bodies").at(0).at("longest_gap_ms"), 50, 1e-6);
   EXPECT_THAT(outcome.err, HasSubstr("cut short"));
+}
+
+/// A body at 0.1 m from a point that it faces wherever it goes: that point, the eye of a head that
+/// turns about it, stays at (0, 0, 0.1) in its frame.
+std::string turning_head(double seconds) {
+  std::string toml = R"(
+[tracker]
+driver = "simulated"
+rate_hz = 240
+noise_position_mm = 0.2
+noise_rotation_deg = 0.02
+[[tracker.path]]
+body = 2
+kind = "waypoints"
+look_at = [0.5, 1.0, -2.0]
+)";
+  // So dense that the curve between them leaves the sphere by less than a micrometre.
+  for (double t = 0; t < seconds; t += 0.05) {
+    const double yaw = 0.5 * std::sin(2.9 * t);
+    const double pitch = 0.3 * std::sin(4.3 * t + 1);
+    toml += fmt::format("[[tracker.path.waypoint]]\ntime_s = {}\nposition = [{}, {}, {}]\n",
+                        t,
+                        0.5 + 0.1 * std::sin(yaw) * std::cos(pitch),
+                        1.0 + 0.1 * std::sin(pitch),
+                        -2.0 + 0.1 * std::cos(yaw) * std::cos(pitch));
+  }
+  return toml;
+}
+
+/// What the tracker of `toml` sends in so many seconds, its stamps late by `late_ms`.
+void record(const std::string& toml, const fs::path& path, double seconds, double late_ms = 0) {
+  VirtualClock clock(Time{std::chrono::seconds(50)});
+  auto reader = TomlReader::parse(toml, "the tracker's table");
+  ASSERT_TRUE(reader);
+  TomlReader table = reader->table("tracker");
+  auto tracker = tracking::open_tracker(table, clock);
+  ASSERT_TRUE(tracker) << tracker.error().what;
+  auto recorder = tracking::PoseRecorder::create(path);
+  ASSERT_TRUE(recorder);
+  while (clock.now() < Time{std::chrono::seconds(50)} + from_seconds(seconds)) {
+    auto sample = (*tracker)->wait_pose(std::chrono::seconds(1));
+    ASSERT_TRUE(sample);
+    sample->time += from_seconds(1e-3 * late_ms);
+    ASSERT_TRUE(recorder->write(*sample));
+  }
+}
+
+TEST_F(TrackTest, TheEyeIsFoundInARecording) {
+  ASSERT_NO_FATAL_FAILURE(record(turning_head(10), file_, 10));
+  const std::string command = "veneer track eye --recording " + file_.string() + " --body 2";
+  const Outcome outcome = run(command + " --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err << outcome.out;
+  const json parsed = json::parse(outcome.out);
+  EXPECT_EQ(parsed.at("good"), true);
+  const auto eye = parsed.at("eye_in_sensor").get<std::vector<double>>();
+  // 0.2 mm of noise over 2400 samples and some 0.2 rad of turning, ten times.
+  EXPECT_NEAR(eye.at(0), 0, 3e-4);
+  EXPECT_NEAR(eye.at(1), 0, 3e-4);
+  EXPECT_NEAR(eye.at(2), 0.1, 3e-4);
+  EXPECT_GT(parsed.at("span_deg").at(1), 20);
+  EXPECT_THAT(run(command).out, HasSubstr("\neye_in_sensor = ["));
+}
+
+TEST_F(TrackTest, TheEyeIsFoundLive) {
+  ASSERT_TRUE(write_text(config_, turning_head(60)));
+  const Outcome outcome = run("veneer track eye " + config_.string() + " --body 2 --seconds 4");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err << outcome.out;
+  EXPECT_THAT(outcome.err, HasSubstr("peephole"));
+  EXPECT_THAT(outcome.err, HasSubstr("degrees"));  // how far it has come
+  EXPECT_THAT(outcome.out, HasSubstr("eye_in_sensor = ["));
+  EXPECT_TRUE(
+      fails(run("veneer track eye " + config_.string() + " --body 3 --seconds 1"), 1, "of 2;"));
+}
+
+TEST_F(TrackTest, AnEyeThatIsNotKnownIsNotTold) {
+  // Body 9 goes round a point, about one axis only.
+  ASSERT_NO_FATAL_FAILURE(record(read_text(config_).value(), file_, 20));
+  const std::string command = "veneer track eye --recording " + file_.string() + " --body 9";
+  const Outcome outcome = run(command + " --json");
+  EXPECT_EQ(outcome.exit_code, 3) << outcome.err;
+  const json parsed = json::parse(outcome.out);
+  EXPECT_EQ(parsed.at("good"), false);
+  EXPECT_FALSE(parsed.contains("eye_in_sensor"));
+  EXPECT_THAT(parsed.at("why"), HasSubstr("at least 10"));
+  const Outcome in_words = run(command);
+  EXPECT_EQ(in_words.exit_code, 3);
+  EXPECT_THAT(in_words.out, HasSubstr("about a second"));
+  EXPECT_EQ(in_words.out.find("eye_in_sensor"), std::string::npos);
+  EXPECT_TRUE(fails(run("veneer track eye --body 2"), 2, "--recording"));
+  EXPECT_TRUE(
+      fails(run("veneer track eye --recording " + file_.string() + " --body 5"), 1, "4, 9"));
+}
+
+TEST_F(TrackTest, TheLatencyIsThatOfTheTracker) {
+  const fs::path reference = folder_.path() / "reference.jsonl";
+  ASSERT_NO_FATAL_FAILURE(record(turning_head(10), file_, 10, 12.5));
+  std::string other = turning_head(10);
+  other.replace(other.find("body = 2"), 8, "body = 7");
+  other.replace(other.find("rate_hz = 240"), 13, "rate_hz = 500\nseed = 5");
+  ASSERT_NO_FATAL_FAILURE(record(other, reference, 10));
+  const std::string command = fmt::format(
+      "veneer track latency {} {} --body 2 --reference-body 7", file_.string(), reference.string());
+  const Outcome outcome = run(command + " --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err << outcome.out;
+  const json parsed = json::parse(outcome.out);
+  EXPECT_EQ(parsed.at("good"), true);
+  EXPECT_NEAR(parsed.at("latency_ms"), 12.5, 0.1);
+  EXPECT_LT(parsed.at("deviation_ms"), 0.1);
+  EXPECT_THAT(run(command).out, HasSubstr("\nlatency_ms = 12."));
+  // It is farther off than is looked for, or of another body.
+  EXPECT_EQ(run(command + " --max-ms 8").exit_code, 3);
+  EXPECT_TRUE(fails(
+      run(fmt::format("veneer track latency {} {} --body 2", file_.string(), reference.string())),
+      1,
+      "bodies in it are 7"));
+}
+
+TEST_F(TrackTest, ALatencyThatIsNotKnownIsNotTold) {
+  ASSERT_NO_FATAL_FAILURE(record(read_text(config_).value(), file_, 10));
+  // Body 4 is at rest, body 9 turns evenly.
+  for (const int body : {4, 9}) {
+    const Outcome outcome = run(fmt::format(
+        "veneer track latency {} {} --body {} --json", file_.string(), file_.string(), body));
+    EXPECT_EQ(outcome.exit_code, 3) << outcome.err;
+    const json parsed = json::parse(outcome.out);
+    EXPECT_FALSE(parsed.contains("latency_ms"));
+    EXPECT_FALSE(parsed.at("why").get<std::string>().empty());
+  }
 }
 
 TEST_F(TrackTest, MistakesAreNamed) {

@@ -3,12 +3,17 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <optional>
 
 #include "base/exit_code.h"
 #include "cli/commands/commands.h"
+#include "cli/track/measurements.h"
 #include "cli/track/report.h"
 #include "cli/track/session.h"
 #include "tracking/drivers.h"
+#include "tracking/eye_offset.h"
+#include "tracking/latency.h"
+#include "tracking/pose_history.h"
 #include "tracking/recording.h"
 #include "tracking/usb_devices.h"
 
@@ -24,6 +29,11 @@ struct TrackOptions {
   std::vector<std::string> settings;
   fs::path file;  // a recording
   double seconds = 0;
+  fs::path reference;  // a recording, too
+  int body = 0;
+  std::optional<int> reference_body;  // absent: `body`
+  double most_latency_ms = 250;
+  double smoothing_ms = 25;
 };
 
 /// What one tells at once from what comes in a blink, and what a log can bear.
@@ -177,6 +187,82 @@ Result<int> replay(CommandLine& line, const TrackOptions& options) {
   return kExitDone;
 }
 
+/// Says again and again how far the measurement has come, where somebody waits for it.
+class EyeProgress {
+ public:
+  explicit EyeProgress(CommandLine& line) : line_(line), shown_(!line.json() && !line.quiet()) {
+    if (!shown_) return;
+    line_.note("Close one eye, hold the other at a peephole, or where two marks cover each other,");
+    line_.note("and keep it there. Turn the head about it: nod, shake and tilt, slowly and far.");
+  }
+  void show(const tracking::PoseHistory& history) {
+    if (!shown_) return;
+    const auto offset = tracking::measure_eye_offset(history);
+    line_.note(offset ? line_of(*offset) : offset.error().what);
+  }
+
+ private:
+  CommandLine& line_;
+  bool shown_;
+};
+
+/// What the tracker sends of the body for the time given.
+Result<tracking::PoseHistory> watched_history(CommandLine& line, const TrackOptions& options) {
+  VENEER_ASSIGN(TrackSession session, TrackSession::open(options.config, options.settings));
+  tracking::PoseHistory history;
+  EyeProgress progress(line);
+  VENEER_TRY(session.run(
+      options.seconds,
+      [&](const tracking::PoseSample& sample) {
+        if (sample.body == options.body) history.add(sample);
+        return Status{};
+      },
+      kLogPeriod,
+      [&] { progress.show(history); }));
+  if (session.bodies().empty()) return session.nothing_came();
+  if (session.bodies().contains(options.body)) return history;
+  std::string others;
+  for (const auto& [body, statistics] : session.bodies())
+    others += fmt::format("{}{}", others.empty() ? "" : ", ", body);
+  return fail(Errc::kNotFound,
+              "{}: no sample of body {} came, but of {}; name one of them with --body",
+              session.tracker().description(),
+              options.body,
+              others);
+}
+
+Result<int> eye(CommandLine& line, const TrackOptions& options) {
+  if (options.config.empty() == options.file.empty()) {
+    return fail(Errc::kInvalidOption,
+                "veneer track eye: name a veneer.toml or, with --recording, a recording");
+  }
+  VENEER_ASSIGN(const tracking::PoseHistory history,
+                options.file.empty() ? watched_history(line, options)
+                                     : tracking::read_history(options.file, options.body));
+  VENEER_ASSIGN(const tracking::EyeOffset offset, tracking::measure_eye_offset(history));
+  const Status good = check(offset, tracking::EyeOffsetLimits{});
+  ordered_json json = json_of(offset, good);
+  json["body"] = options.body;
+  line.print(json, text_of(offset, good));
+  return good ? kExitDone : kExitGateMissed;
+}
+
+Result<int> latency(CommandLine& line, const TrackOptions& options) {
+  VENEER_ASSIGN(const tracking::PoseHistory tracker,
+                tracking::read_history(options.file, options.body));
+  VENEER_ASSIGN(
+      const tracking::PoseHistory reference,
+      tracking::read_history(options.reference, options.reference_body.value_or(options.body)));
+  VENEER_ASSIGN(const tracking::Latency latency,
+                tracking::measure_latency(tracker,
+                                          reference,
+                                          {.most_s = 1e-3 * options.most_latency_ms,
+                                           .smoothing_s = 1e-3 * options.smoothing_ms}));
+  const Status good = check(latency, tracking::LatencyLimits{});
+  line.print(json_of(latency, good), text_of(latency, good));
+  return good ? kExitDone : kExitGateMissed;
+}
+
 }  // namespace
 
 Result<int> run_track(CommandLine& line) {
@@ -199,6 +285,10 @@ Result<int> run_track(CommandLine& line) {
         ->capture_default_str()
         ->check(CLI::NonNegativeNumber);
   };
+  const auto add_body = [&](CLI::App* command) {
+    command->add_option("--body", options.body, "The tracked body's number")->required();
+  };
+  double eye_seconds = 30;
   add_config(add("list", "Drivers, what is plugged in, and how a configured tracker does", &list));
   CLI::App* watching = add("watch", "Rate, latency, jitter and position of every body", &watch);
   add_config(watching)->required();
@@ -210,7 +300,35 @@ Result<int> run_track(CommandLine& line) {
       ->required();
   CLI::App* replaying = add("replay", "Rate, gaps and length of a recording", &replay);
   replaying->add_option("file", options.file, "A recording, NAME.jsonl")->required();
+  CLI::App* eyeing =
+      add("eye", "Measure where the eye is in the sensor's frame, for scene.toml", &eye);
+  add_config(eyeing);
+  add_body(eyeing);
+  eyeing->add_option("--seconds", eye_seconds, "Measure for so long; 0 is until Ctrl-C")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+  eyeing->add_option("--recording", options.file, "Measure from a recording instead, NAME.jsonl");
+  CLI::App* timing =
+      add("latency", "How much later a tracker tells of a motion than a reference", &latency);
+  timing->add_option("recording", options.file, "What the tracker told, NAME.jsonl")->required();
+  timing
+      ->add_option("reference",
+                   options.reference,
+                   "What a tracker whose latency is known told of the same motion, recorded at the "
+                   "same time on the same machine")
+      ->required();
+  add_body(timing);
+  timing->add_option("--reference-body", options.reference_body, "Where the reference counts anew");
+  timing->add_option("--max-ms", options.most_latency_ms, "Look for latencies up to this")
+      ->capture_default_str();
+  timing
+      ->add_option(
+          "--smoothing-ms",
+          options.smoothing_ms,
+          "Smooth over so long to either side; four samples of the slower tracker must fit")
+      ->capture_default_str();
   line.parse();
+  if (eyeing->parsed()) options.seconds = eye_seconds;
   return action(line, options);
 }
 
