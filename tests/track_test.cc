@@ -210,7 +210,7 @@ TEST_F(TrackTest, TheEyeIsFoundLive) {
   const Outcome outcome = run("veneer track eye " + config_.string() + " --body 2 --seconds 4");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err << outcome.out;
   EXPECT_THAT(outcome.err, HasSubstr("peephole"));
-  EXPECT_THAT(outcome.err, HasSubstr("degrees"));  // how far it has come
+  EXPECT_THAT(outcome.err, HasSubstr("good enough"));  // how far it has come
   EXPECT_THAT(outcome.out, HasSubstr("eye_in_sensor = ["));
   EXPECT_TRUE(
       fails(run("veneer track eye " + config_.string() + " --body 3 --seconds 1"), 1, "of 2;"));

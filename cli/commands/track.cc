@@ -198,7 +198,9 @@ class EyeProgress {
   void show(const tracking::PoseHistory& history) {
     if (!shown_) return;
     const auto offset = tracking::measure_eye_offset(history);
-    line_.note(offset ? line_of(*offset) : offset.error().what);
+    if (!offset) return line_.note(offset.error().what);
+    const bool enough = check(*offset, tracking::EyeOffsetLimits{}).has_value();
+    line_.note(line_of(*offset) + (enough ? "; good enough" : "; not enough yet"));
   }
 
  private:
