@@ -37,7 +37,7 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? kExitDone : kExitUsage;
   }
 
-  spdlog::set_default_logger(spdlog::stderr_color_st("veneerd"));
+  spdlog::set_default_logger(spdlog::stderr_color_mt("veneerd"));
   spdlog::set_pattern("%n %^%l%$: %v");
   if (quiet) spdlog::set_level(spdlog::level::warn);
   struct sigaction action {};

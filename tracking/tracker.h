@@ -16,9 +16,10 @@ class Tracker {
   virtual ~Tracker() = default;
   /// For logs: driver and device.
   [[nodiscard]] virtual std::string description() const = 0;
-  /// The next sample, in the order of arrival. Blocks for at most `timeout` on the tracker's clock.
-  /// A device that was unplugged is waited for: that is a timeout too, and status() tells.
-  /// Errors: kTimeout (try again), kDisconnected (final; open again).
+  /// The next sample, in the order of arrival. Blocks for at most `timeout` on the tracker's clock;
+  /// while a device is opened or told something, for some tenths of a second more. A device that
+  /// was unplugged is waited for: that is a timeout too, and status() tells. Errors: kTimeout (try
+  /// again), kDisconnected (final; open again).
   [[nodiscard]] virtual Result<PoseSample> wait_pose(Duration timeout) = 0;
   /// How it is doing. Any thread may ask; it may have to wait for a moment.
   [[nodiscard]] virtual TrackerStatus status() const { return {}; }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <set>
 
 #include "base/colour.h"
 #include "base/exit_code.h"
@@ -93,7 +94,10 @@ Result<std::vector<Verdict>> rehearse(const fs::path& path,
   VENEER_ASSIGN(const Scenario scenario, Scenario::load(path, settings));
   const fs::path folder = options.out / scenario.name();
   std::error_code error;
-  fs::remove_all(folder, error);
+  // What an earlier rehearsal left, and nothing else.
+  for (const char* name : {"run.json", "frames.csv", "frames", "verdict.json", "index.html"}) {
+    fs::remove_all(folder / name, error);
+  }
   fs::create_directories(folder, error);
   if (error) return fail(Errc::kIo, "making {}: {}", folder.string(), error.message());
 
@@ -146,6 +150,17 @@ Result<int> run_harness(CommandLine& line) {
       ->check(CLI::Range(1, 1000000));
   line.parse();
 
+  std::set<fs::path> names{"profile"};  // the harness's own folder
+  for (const fs::path& path : options.scenarios) {
+    if (!names.insert(path.stem()).second) {
+      return fail(
+          Errc::kInvalidOption,
+          "rehearsing {}: another folder of {} is already called \"{}\"; rename the scenario",
+          path.string(),
+          options.out.string(),
+          path.stem().string());
+    }
+  }
   std::error_code error;
   fs::create_directories(options.out, error);
   if (error) return fail(Errc::kIo, "making {}: {}", options.out.string(), error.message());

@@ -285,7 +285,7 @@ Result<int> run_track(CommandLine& line) {
   const auto add_seconds = [&](CLI::App* command) {
     command->add_option("--seconds", options.seconds, "End after so long; 0 is until Ctrl-C")
         ->capture_default_str()
-        ->check(CLI::NonNegativeNumber);
+        ->check(CLI::Range(0.0, 1e6));
   };
   const auto add_body = [&](CLI::App* command) {
     command->add_option("--body", options.body, "The tracked body's number")->required();
@@ -308,7 +308,7 @@ Result<int> run_track(CommandLine& line) {
   add_body(eyeing);
   eyeing->add_option("--seconds", eye_seconds, "Measure for so long; 0 is until Ctrl-C")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0.0, 1e6));
   eyeing->add_option("--recording", options.file, "Measure from a recording instead, NAME.jsonl");
   CLI::App* timing =
       add("latency", "How much later a tracker tells of a motion than a reference", &latency);

@@ -74,6 +74,12 @@ Eigen::Vector3d eye_of(const Scenario& scenario, const render::Scene& scene, dou
   return scenario.paths.at(scenario.observer_at(seconds)).at(seconds) * scene.eye_in_sensor;
 }
 
+/// Where the object truly is.
+RigidTransform object_of(const Scenario& scenario, const render::Scene& scene, double seconds) {
+  if (scene.object_body < 0) return scene.world_from_object;
+  return scenario.paths.at(scene.object_body).at(seconds) * scene.world_from_object;
+}
+
 double angle_deg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
 }
@@ -91,7 +97,7 @@ void add_frames(const Table& table,
     const Eigen::Vector3d shown{
         table.number(i, "eye_x"), table.number(i, "eye_y"), table.number(i, "eye_z")};
     const Eigen::Vector3d truth = eye_of(scenario, scene, seconds);
-    const Eigen::Vector3d object = scene.world_from_object.translation;
+    const Eigen::Vector3d object = object_of(scenario, scene, seconds).translation;
     run.seconds.push_back(seconds);
     q["position_error_mm"].push_back(1e3 * (shown - truth).norm());
     q["view_error_deg"].push_back(angle_deg(shown - object, truth - object));
@@ -146,7 +152,8 @@ Status add_pictures(const Scenario& scenario,
     if (shown.width() != right.width() || shown.height() != right.height()) {
       return fail(Errc::kBadFormat, "reading {}: it is not of the projector's size", file.string());
     }
-    renderer->draw({eye_of(scenario, scene, run.seconds[i]), scene.world_from_object, 0});
+    renderer->draw(
+        {eye_of(scenario, scene, run.seconds[i]), object_of(scenario, scene, run.seconds[i]), 0});
     renderer->read_target(right.view());
     double sum = 0;
     double count = 0;
@@ -172,6 +179,12 @@ Result<HarnessRun> read_harness_run(const Scenario& scenario,
                                     const fs::path& material,
                                     const fs::path& profile,
                                     Progress& progress) {
+  if (scene.object_body >= 0 && !scenario.paths.contains(scene.object_body)) {
+    return fail(Errc::kInvalidOption,
+                "rehearsing {}: the scene's object is body {}, which has no [[tracker.path]]",
+                scenario.path.string(),
+                scene.object_body);
+  }
   const fs::path summary = folder / "run.json";
   VENEER_ASSIGN(const std::string text, read_text(summary));
   HarnessRun run;

@@ -6,9 +6,13 @@
 
 #include "base/toml_reader.h"
 #include "cli/harness/statistic.h"
+#include "render/scene.h"
 
 namespace veneer::cli {
 namespace {
+
+/// As many as veneerd remembers of a run.
+constexpr int kMostFrames = 65536;
 
 Expectation read_expectation(TomlReader& table) {
   Expectation expectation;
@@ -46,6 +50,11 @@ Result<Scenario> Scenario::load(const std::filesystem::path& path,
   scenario.path = path;
   toml.require("scene", scenario.scene);
   scenario.scene = toml.folder() / scenario.scene;
+  int frames = 0;
+  toml.require("frames", frames);
+  if (frames < 1 || frames > kMostFrames) {
+    toml.add_error("frames", fmt::format("{} is outside 1 to {}", frames, kMostFrames));
+  }
   TomlReader about = toml.table("scenario");
   about.require("about", scenario.about);
   for (TomlReader& table : about.tables("observer")) {
@@ -64,8 +73,19 @@ Result<Scenario> Scenario::load(const std::filesystem::path& path,
   TomlReader tracker = toml.table("tracker");
   scenario.faults = tracking::read_faults(tracker);
   VENEER_ASSIGN(const std::vector<tracking::Path> paths, tracking::Path::read_all(tracker));
+  for (const tracking::Fault& fault : scenario.faults) {
+    const auto has_body = [&fault](const tracking::Path& path) {
+      return path.body() == fault.body;
+    };
+    if (fault.body != 0 && std::ranges::none_of(paths, has_body)) {
+      tracker.add_error("fault", fmt::format("body {} has no path", fault.body));
+    }
+  }
   for (const tracking::Path& each : paths) scenario.paths.emplace(each.body(), each);
-  if (scenario.observers.empty()) scenario.observers.push_back({0, paths.front().body()});
+  if (scenario.observers.empty()) {
+    VENEER_ASSIGN(const render::Scene scene, render::Scene::load(scenario.scene));
+    scenario.observers.push_back({0, scene.observer_bodies.front()});
+  }
   for (const TrueObserver& observer : scenario.observers) {
     if (!scenario.paths.contains(observer.body)) {
       about.add_error("observer", fmt::format("body {} has no path", observer.body));

@@ -182,6 +182,14 @@ ClockMapper::Mapped ClockMapper::map(std::uint64_t ticks, Time arrival) {
   newest_ticks_ = first ? wide : std::max(wide, *newest_ticks_);
   newest_device_s_ = std::max(newest_device_s_, device_s);
   learn(device_s, offset_s);
+  if (locked_ && envelope(device_s) - applied_s_ > kMisfit_s) {
+    // Everything has been late for the whole window: the clock was set back, or stood still, while
+    // nobody looked. Slewing there would take hours.
+    reset();
+    Mapped mapped = map(ticks, arrival);
+    mapped.verdict = Verdict::kRestarted;
+    return mapped;
+  }
   if (locked_) {
     // Follows the slope, and goes the rest of the way to the envelope as fast as it may.
     const double passed_s = device_s - applied_at_s_;

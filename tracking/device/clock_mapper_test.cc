@@ -249,6 +249,31 @@ TEST(ClockMapper, TheMappedTimeMovesSlowlyWhenTheDelayChangesForGood) {
   EXPECT_NEAR(previous_offset, 3e-3, 0.2e-3);  // half a minute later it has arrived
 }
 
+TEST(ClockMapper, AClockThatWasSetBackWhileNobodyLookedIsFoundAgain) {
+  // Nothing is seen for 12 s, in which the device's clock loses 10: what comes then looks late.
+  ClockMapper mapper(kMicroseconds);
+  Time arrival = kStart;
+  std::uint64_t ticks = 0;
+  const auto next = [&] {
+    arrival += milliseconds(10);
+    ticks += 10'000;
+    return mapper.map(ticks, arrival);
+  };
+  for (int i = 0; i < 500; ++i) EXPECT_EQ(next().verdict, ClockMapper::Verdict::kMapped);
+  EXPECT_TRUE(mapper.locked());
+  arrival += seconds(12);
+  ticks += 2'000'000;
+  int restarts = 0;
+  ClockMapper::Mapped mapped;
+  for (int i = 0; i < 600; ++i) {
+    mapped = next();
+    restarts += mapped.verdict == ClockMapper::Verdict::kRestarted ? 1 : 0;
+  }
+  EXPECT_EQ(restarts, 1);
+  EXPECT_TRUE(mapped.locked);
+  EXPECT_LT(arrival - mapped.time, milliseconds(1));
+}
+
 TEST(ClockMapper, HostileTicksHurtNobody) {
   for (const int bits : {1, 8, 32, 64}) {
     Pcg32 random(static_cast<std::uint64_t>(bits));

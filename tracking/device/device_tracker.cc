@@ -168,6 +168,10 @@ void DeviceTracker::initialise(Time deadline) {
   const IoStatus status = command.kind == Command::Kind::kFeature
                               ? transport_->send_feature(command.bytes)
                               : transport_->write(command.bytes, now + kWriteTime);
+  if (status == IoStatus::kGone) {
+    on_error(status);
+    return;
+  }
   if (status != IoStatus::kOk) {
     count([](TrackerCounters& counters) { ++counters.io_errors; });
     close(TrackerState::kFailed,
@@ -218,16 +222,27 @@ void DeviceTracker::on_silence(Time now) {
   const std::string text = fmt::format(
       "{} has sent no pose for {:.2f} s", port_->description(), to_seconds(now - newest_sample_));
   if (recovery == Recovery::kTellAgain) {
-    count([](TrackerCounters& counters) { ++counters.restarts; });
-    start(protocol_->restart(), TrackerState::kSilent, text + "; it was told again to send");
+    std::vector<Command> commands = protocol_->restart();
+    const bool told = !commands.empty();
+    if (told) count([](TrackerCounters& counters) { ++counters.restarts; });
+    start(std::move(commands),
+          TrackerState::kSilent,
+          text + (told ? "; it was told again to send" : ""));
     return;
   }
   newest_restart_ = now;
+  // Said once: a sender that is off may be off for days.
+  const bool known = status_.state == TrackerState::kSilent;
   if (recovery == Recovery::kListen) {
-    set_state(TrackerState::kSilent, text + "; does it send, and to here?");
+    if (!known) set_state(TrackerState::kSilent, text + "; does it send, and to here?");
     return;
   }
-  set_state(TrackerState::kSilent, text + "; it was asked whether it is there");
+  if (!known) {
+    set_state(TrackerState::kSilent,
+              text +
+                  "; it was asked whether it is there. Does it know the body, or tracker, by "
+                  "this name?");
+  }
   for (const Command& command : protocol_->restart()) {
     const IoStatus status = transport_->write(command.bytes, now + kWriteTime);
     if (status == IoStatus::kOk) continue;
@@ -240,7 +255,19 @@ void DeviceTracker::take_bytes(std::span<const std::byte> bytes, Time arrival) {
   raw_.clear();
   reply_.clear();
   protocol_->feed(bytes, raw_, reply_);
-  for (const RawSample& raw : raw_) take_sample(raw, arrival);
+  for (std::size_t i = 0; i < raw_.size(); ++i) {
+    // Where nothing but the arrival tells them apart, the last of a message is the newest.
+    const bool stale =
+        !raw_[i].ticks && !raw_[i].sequence &&
+        std::any_of(raw_.begin() + static_cast<std::ptrdiff_t>(i) + 1,
+                    raw_.end(),
+                    [&](const RawSample& other) { return other.sensor == raw_[i].sensor; });
+    if (stale) {
+      count([](TrackerCounters& counters) { ++counters.late; });
+    } else {
+      take_sample(raw_[i], arrival);
+    }
+  }
 
   const ProtocolCounters now_seen = protocol_->counters();
   if (now_seen.skipped_bytes != seen_.skipped_bytes || now_seen.bad_frames != seen_.bad_frames) {

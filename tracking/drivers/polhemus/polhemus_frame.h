@@ -42,7 +42,7 @@ struct PolhemusFrame {
   static constexpr std::size_t kBytes = kHeader + kPayload;
   static constexpr std::uint8_t kNoError = ' ';
   static constexpr int kStations = 16;
-  /// Of both models; the frame count is the finer clock, the milliseconds are made of it.
+  /// Of a LIBERTY. Its frame count is the finer clock, the milliseconds are made of it.
   static constexpr double kFrames_hz = 240;
 };
 

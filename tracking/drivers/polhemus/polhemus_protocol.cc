@@ -24,10 +24,17 @@ std::vector<Command> PolhemusProtocol::start() const {
 }
 
 std::optional<DeviceClock> PolhemusProtocol::clock() const {
-  return DeviceClock{WrappingCounter{32}, 1 / PolhemusFrame::kFrames_hz};
+  const double milliseconds = 1e-3;
+  return DeviceClock{
+      WrappingCounter{32},
+      model_ == PolhemusModel::kLiberty ? 1 / PolhemusFrame::kFrames_hz : milliseconds};
 }
 
-Duration PolhemusProtocol::period() const { return from_seconds(1 / PolhemusFrame::kFrames_hz); }
+Duration PolhemusProtocol::period() const {
+  constexpr double kPatriot_hz = 60;  // for how long a silence is one; nothing else depends on it
+  return from_seconds(
+      1 / (model_ == PolhemusModel::kLiberty ? PolhemusFrame::kFrames_hz : kPatriot_hz));
+}
 
 void PolhemusProtocol::reset() {
   pending_.clear();
@@ -57,7 +64,7 @@ void PolhemusProtocol::feed(std::span<const std::byte> bytes,
     text_.end();
     RawSample& sample = samples.emplace_back();
     sample.sensor = frame.station;
-    sample.ticks = frame.count;
+    sample.ticks = model_ == PolhemusModel::kLiberty ? frame.count : frame.milliseconds;
     sample.sequence = frame.count;
     sample.position_m = kMetresPerCentimetre * frame.position_cm.cast<double>();
     sample.rotation = frame.rotation.cast<double>();

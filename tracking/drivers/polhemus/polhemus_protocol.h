@@ -9,7 +9,8 @@ namespace veneer::tracking {
 
 /// LIBERTY and PATRIOT, binary continuous output. Sensor n is station n, the frame of reference is
 /// that of the transmitter (x forward, y right, z down as it is shipped), positions come in
-/// centimetres and leave in metres. Ticks and sequence numbers both are the frame count.
+/// centimetres and leave in metres. Sequence numbers are the frame count; ticks are too of a
+/// LIBERTY, whose rate is known, and the milliseconds of a PATRIOT, whose rate is not relied on.
 ///
 /// There is no checksum. A frame counts when tag, station, command and size are right: six bytes
 /// that hardly ever stand so among others. When not, one byte is skipped, never more, so that no

@@ -86,6 +86,25 @@ TEST(PolhemusProtocol, SaysWhatTheFrameSays) {
   EXPECT_EQ(protocol.counters().skipped_bytes, 0U);
 }
 
+TEST(PolhemusProtocol, EachModelIsTimedByWhatIsKnownOfIt) {
+  Bytes bytes;
+  append(bytes, frame_of(480));
+  PolhemusProtocol liberty(PolhemusModel::kLiberty);
+  const auto fine = feed(liberty, bytes);
+  ASSERT_EQ(fine.size(), 1U);
+  EXPECT_DOUBLE_EQ(static_cast<double>(*fine[0].ticks) * liberty.clock()->seconds_per_tick, 2);
+  // Of a PATRIOT the rate of its frames is not relied on.
+  PolhemusFrame frame = frame_of(120);
+  frame.milliseconds = 2000;
+  bytes.clear();
+  append(bytes, frame, PolhemusModel::kPatriot);
+  PolhemusProtocol patriot(PolhemusModel::kPatriot);
+  const auto coarse = feed(patriot, bytes);
+  ASSERT_EQ(coarse.size(), 1U);
+  EXPECT_DOUBLE_EQ(static_cast<double>(*coarse[0].ticks) * patriot.clock()->seconds_per_tick, 2);
+  EXPECT_EQ(coarse[0].sequence, 120U);
+}
+
 TEST(PolhemusProtocol, AnErrorLetterMakesASampleSuspect) {
   PolhemusProtocol protocol(PolhemusModel::kLiberty);
   PolhemusFrame frame = frame_of(1);

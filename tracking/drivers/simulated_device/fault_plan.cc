@@ -31,6 +31,12 @@ constexpr std::array kNames{
     std::pair{FaultKind::kUnplug, std::string_view("unplug")},
 };
 
+/// Whether it is a matter of single frames, each of a body.
+bool strikes_bodies(FaultKind kind) {
+  return kind == FaultKind::kBitFlip || kind == FaultKind::kDrop || kind == FaultKind::kInvalid ||
+         kind == FaultKind::kMirror || kind == FaultKind::kTeleport;
+}
+
 using Name = decltype(kNames)::value_type;
 
 void check_range(TomlReader& toml, std::string_view key, double value, double least, double most) {
@@ -71,6 +77,14 @@ std::vector<Fault> read_faults(TomlReader& toml) {
     check_range(table, "share", fault.share, 0, 1);
     check_range(table, "samples", fault.samples, 1, 1000);
     check_range(table, "delay_ms", fault.delay_ms, 0, 10000);
+    const bool once = fault.kind == FaultKind::kClockRestart || fault.kind == FaultKind::kText ||
+                      fault.kind == FaultKind::kOtherDevice;
+    if (!once && !(fault.for_s > 0)) {
+      table.add_error("for_s", "is not above 0: it would never strike");
+    }
+    if (fault.body != 0 && !strikes_bodies(fault.kind)) {
+      table.add_error("body", "this kind strikes the device, not one of its bodies");
+    }
     if (!fault.shift_m.allFinite()) table.add_error("shift_m", "is not finite");
     faults.push_back(fault);
   }

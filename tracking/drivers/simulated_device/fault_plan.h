@@ -41,7 +41,7 @@ struct Fault {
   double at_s = 0;      ///< since the tracker was opened
   double for_s = 0;     ///< how long; what happens once (restart, text, other device) needs none
   double share = 1;     ///< of the frames within that time. 0 to 1
-  int body = 0;         ///< whose frames; 0: all
+  int body = 0;         ///< whose frames, where it strikes single ones; 0: all
   int samples = 1;      ///< 1 to 1000
   double delay_ms = 0;  ///< 0 to 10000
   Eigen::Vector3d shift_m = Eigen::Vector3d::Zero();

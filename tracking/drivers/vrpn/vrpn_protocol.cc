@@ -18,6 +18,7 @@ constexpr std::size_t kAlignment = 8;
 /// VRPN's own buffers hold no more.
 constexpr std::uint32_t kLongestMessage = 64000;
 constexpr std::size_t kPoseSize = 64;
+constexpr std::int32_t kMostSensors = 1024;  // of each something is remembered
 
 constexpr std::int32_t kSenderDescription = -1;
 constexpr std::int32_t kTypeDescription = -2;
@@ -197,7 +198,8 @@ void VrpnProtocol::take_description(const Header& header, Bytes payload) {
 }
 
 void VrpnProtocol::take_pose(const Header& header, Bytes payload, std::vector<RawSample>& samples) {
-  if (payload.size() != kPoseSize || signed_at(payload, 0) < 0) {
+  if (payload.size() != kPoseSize || signed_at(payload, 0) < 0 ||
+      signed_at(payload, 0) >= kMostSensors) {
     ++counters_.bad_frames;  // the next message is where it should be all the same
     return;
   }
