@@ -119,7 +119,7 @@ TEST(HarnessErrors, NameWhatThereIs) {
   EXPECT_TRUE(fails(harness(changed("\"p95\"", "\"p96\"")), kExitUsage, "\"p96\" is none of"));
   EXPECT_TRUE(fails(harness(changed("at_most = 1.0\n", "")), kExitUsage, "no bound"));
   EXPECT_TRUE(fails(harness(changed("about = ", "abuot = ")), kExitUsage, "about"));
-  EXPECT_TRUE(fails(harness(changed("body = 1", "body = 99")), kExitFailed, "no station"));
+  EXPECT_TRUE(fails(harness(changed("body = 1", "body = 99")), kExitUsage, "body 1 has no path"));
   EXPECT_TRUE(fails(harness(changed("scene.toml", "secne.toml")), kExitFailed, "secne.toml"));
   EXPECT_TRUE(fails(harness("missing.toml"), kExitUsage, "missing.toml"));
 }

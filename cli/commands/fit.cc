@@ -151,8 +151,10 @@ Result<int> run_fit(CommandLine& line) {
   SilentProgress silent;
   const Result<FitReport> report =
       fit(request, *ranks, ranks->rank() == 0 ? line.progress() : silent);
-  if (ranks->rank() > 0) return report ? kExitDone : exit_code_of(report.error());
-  if (!report) return tl::unexpected(report.error());
+  const Status agreed = btf::agree(*ranks, report ? Status() : tl::unexpected(report.error()));
+  // Rank 0 tells, and fails, for all: another that ended first would have mpirun cut it short.
+  if (ranks->rank() > 0) return kExitDone;
+  VENEER_TRY(agreed);
   line.print({{"material", request.out.string()},
               {"model", request.model},
               {"ranks", ranks->size()},

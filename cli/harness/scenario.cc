@@ -74,8 +74,8 @@ Result<Scenario> Scenario::load(const std::filesystem::path& path,
   scenario.faults = tracking::read_faults(tracker);
   VENEER_ASSIGN(const std::vector<tracking::Path> paths, tracking::Path::read_all(tracker));
   for (const tracking::Fault& fault : scenario.faults) {
-    const auto has_body = [&fault](const tracking::Path& path) {
-      return path.body() == fault.body;
+    const auto has_body = [&fault](const tracking::Path& each) {
+      return each.body() == fault.body;
     };
     if (fault.body != 0 && std::ranges::none_of(paths, has_body)) {
       tracker.add_error("fault", fmt::format("body {} has no path", fault.body));

@@ -281,7 +281,8 @@ TEST_P(LibertyWithFaults, OneNowAndThenIsCountedAndTrackingGoesOn) {
     ASSERT_TRUE(tracks());  // samples in between tell a fault from a broken device
   }
   EXPECT_GE(status().counters.io_errors, before.io_errors + 3);
-  EXPECT_EQ(status().counters.opened, before.opened) << "no reason to open it again";
+  // A busy machine may not get its transfers back in time to clear a halt, and open it again.
+  EXPECT_LE(status().counters.opened, before.opened + 1) << "no reason to open it each time";
 }
 
 TEST_P(LibertyWithFaults, ForEverIsBoundedInWorkAndEndsWhenTheFaultsDo) {
