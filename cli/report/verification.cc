@@ -156,8 +156,8 @@ Result<RunVerification> verify_run(const VerificationOptions& options, Progress&
     const RecordedFrame& frame = frames[i];
     VerifiedFrame verified;
     verified.number = frame.number;
-    verified.eye_in_world =
-        run.world_from_body(scene.observer_bodies.front(), frame.display_time) * scene.eye_in_sensor;
+    verified.eye_in_world = run.world_from_body(scene.observer_bodies.front(), frame.display_time) *
+                            scene.eye_in_sensor;
     const RigidTransform world_from_object =
         scene.object_body < 0
             ? scene.world_from_object
