@@ -50,10 +50,13 @@ class FakeProjector final : public Colorimeter, public PatchDisplay {
   }
 
   std::string description() const override { return "fake colorimeter"; }
-  Status show(const std::array<std::uint16_t, 3>& code, bool lit) override {
+  Status show(const Rgb16& code, bool lit) override {
     code_ = code;
     lit_ = lit;
     return {};
+  }
+  Status show_picture(ImageView<const Rgb16>) override {
+    return fail(Errc::kInvalidOption, "only patches are shown here");
   }
   Result<Xyz> read(Target target, const Eigen::Vector2d& pixel) override {
     if (timeouts > 0) {

@@ -8,6 +8,7 @@
 #include "base/progress.h"
 #include "base/result.h"
 #include "calibration/instruments/colorimeter.h"
+#include "calibration/patch_display.h"
 #include "calibration/profile.h"
 
 namespace veneer::calibration {

@@ -3,8 +3,6 @@
 
 #include <Eigen/Core>
 
-#include <array>
-#include <cstdint>
 #include <string>
 
 #include "base/colour.h"
@@ -29,14 +27,6 @@ class Colorimeter {
   /// One reading, XYZ in cd/m^2, of the spot that the projector pixel `pixel` lights.
   /// Errors: kTimeout (try again), kDisconnected.
   [[nodiscard]] virtual Result<Xyz> read(Target target, const Eigen::Vector2d& pixel) = 0;
-};
-
-/// What shows patches while an instrument reads them.
-class PatchDisplay {
- public:
-  virtual ~PatchDisplay() = default;
-  /// The whole raster in one code triple; `lit` false is the lamp off (only ambient is left).
-  [[nodiscard]] virtual Status show(const std::array<std::uint16_t, 3>& code, bool lit = true) = 0;
 };
 
 }  // namespace veneer::calibration

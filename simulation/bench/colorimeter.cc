@@ -2,6 +2,7 @@
 #include "simulation/bench/colorimeter.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace veneer::simulation {
 
@@ -16,6 +17,34 @@ Status VirtualPatchDisplay::show(const std::array<std::uint16_t, 3>& code, bool 
                 full);
   code_ = code;
   lit_ = lit;
+  picture_ = {};
+  return {};
+}
+
+Status VirtualPatchDisplay::show_picture(ImageView<const Rgb16> codes) {
+  const ProjectorTruth& projector = bench_.truth().projector;
+  if (codes.width() != projector.width || codes.height() != projector.height)
+    return fail(Errc::kInvalidOption,
+                "showing a picture on the bench: it has {} x {} pixels, the projector {} x {}",
+                codes.width(),
+                codes.height(),
+                projector.width,
+                projector.height);
+  const int full = (1 << projector.bits) - 1;
+  Image<Rgb16> picture(codes.width(), codes.height());
+  for (int y = 0; y < codes.height(); ++y) {
+    for (int x = 0; x < codes.width(); ++x) {
+      if (*std::ranges::max_element(codes(x, y)) > full)
+        return fail(Errc::kInvalidOption,
+                    "showing a picture on the bench: pixel {}, {} has a code over {}",
+                    x,
+                    y,
+                    full);
+      picture(x, y) = codes(x, y);
+    }
+  }
+  picture_ = std::move(picture);
+  lit_ = true;
   return {};
 }
 

@@ -5,8 +5,10 @@
 #include <cstdint>
 #include <string>
 
+#include "base/image.h"
 #include "base/random.h"
 #include "calibration/instruments/colorimeter.h"
+#include "calibration/patch_display.h"
 #include "calibration/profile.h"
 #include "simulation/bench.h"
 
@@ -18,14 +20,20 @@ class VirtualPatchDisplay final : public calibration::PatchDisplay {
   /// @param bench  borrowed; must outlive the display.
   explicit VirtualPatchDisplay(const Bench& bench) : bench_(bench) {}
   /// Errors: kInvalidOption (a code over 2^bits - 1).
-  [[nodiscard]] Status show(const std::array<std::uint16_t, 3>& code, bool lit = true) override;
+  [[nodiscard]] Status show(const Rgb16& code, bool lit = true) override;
+  /// Errors: kInvalidOption (a picture of another size than the raster, a code over 2^bits - 1).
+  [[nodiscard]] Status show_picture(ImageView<const Rgb16> codes) override;
   [[nodiscard]] const std::array<std::uint16_t, 3>& code() const { return code_; }
   [[nodiscard]] bool lit() const { return lit_; }
+  /// Empty while a patch is shown.
+  [[nodiscard]] const Image<Rgb16>& picture() const& { return picture_; }
+  const Image<Rgb16>& picture() const&& = delete;
 
  private:
   const Bench& bench_;
   std::array<std::uint16_t, 3> code_{};
   bool lit_ = false;
+  Image<Rgb16> picture_;  // empty while a patch is shown
 };
 
 struct VirtualColorimeterOptions {
