@@ -7,6 +7,7 @@
 
 #include "projector/outputs/file/file_output.h"
 #include "projector/outputs/null/null_output.h"
+#include "projector/outputs/window/window_output.h"
 
 namespace veneer::projector {
 namespace {
@@ -20,6 +21,7 @@ constexpr std::array kOutputs{
     OutputDriver{
         "file", "PNG files of the drive codes, EXR of the target", &open_as_output<FileOutput>},
     OutputDriver{"null", "nowhere, for timing", &open_as_output<NullOutput>},
+    OutputDriver{"window", "a window on the desktop", &open_as_output<WindowOutput>},
 };
 static_assert(std::ranges::is_sorted(kOutputs, {}, &OutputDriver::name));
 

@@ -20,7 +20,7 @@ struct OutputDriver {
 };
 
 /// Every output, sorted by name: "file" (PNG of the drive codes, 8 or 16 bits, and EXR of the
-/// target if asked for; written by a thread of its own), "null".
+/// target if asked for; written by a thread of its own), "null", "window".
 [[nodiscard]] std::span<const OutputDriver> output_drivers();
 /// Opens the output that the key `driver` of the table names.
 [[nodiscard]] Result<std::unique_ptr<Output>> open_output(TomlReader& config);

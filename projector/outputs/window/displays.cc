@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "projector/outputs/window/displays.h"
+
+#include <SDL.h>
+
+#include "projector/outputs/window/internal_sdl.h"
+
+namespace veneer::projector {
+
+void SdlVideo::End::operator()(const void*) const noexcept { SDL_QuitSubSystem(SDL_INIT_VIDEO); }
+
+Result<SdlVideo> SdlVideo::begin() {
+  // Ctrl-C stays with the program that opens a window.
+  SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
+  // Else SDL may take over the thread's GL context to copy a window's pixels.
+  SDL_SetHint(SDL_HINT_FRAMEBUFFER_ACCELERATION, "0");
+  SDL_SetHint(SDL_HINT_VIDEO_ALLOW_SCREENSAVER, "0");
+  SDL_SetHint(SDL_HINT_VIDEO_MINIMIZE_ON_FOCUS_LOSS, "0");
+  if (SDL_InitSubSystem(SDL_INIT_VIDEO) != 0)
+    return fail(
+        Errc::kUnavailable,
+        "looking for displays: {}; is there a desktop (DISPLAY or WAYLAND_DISPLAY), and may "
+        "this user open windows on it?",
+        SDL_GetError());
+  static constexpr char kToken = 0;
+  return SdlVideo(&kToken);
+}
+
+Result<std::vector<Display>> list_displays() {
+  VENEER_ASSIGN(const SdlVideo video, SdlVideo::begin());
+  std::vector<Display> displays;
+  for (int i = 0; i < SDL_GetNumVideoDisplays(); ++i) {
+    SDL_Rect bounds{};
+    SDL_DisplayMode mode{};
+    if (SDL_GetDisplayBounds(i, &bounds) != 0) continue;
+    const char* name = SDL_GetDisplayName(i);
+    displays.push_back({i,
+                        name == nullptr ? "" : name,
+                        bounds.x,
+                        bounds.y,
+                        bounds.w,
+                        bounds.h,
+                        SDL_GetCurrentDisplayMode(i, &mode) == 0 ? mode.refresh_rate : 0.0});
+  }
+  return displays;
+}
+
+}  // namespace veneer::projector
