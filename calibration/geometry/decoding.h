@@ -20,14 +20,14 @@ using GreyPicture = Image<std::uint16_t>;
 [[nodiscard]] GreyPicture grey_of(ImageView<const Rgb16> counts);
 
 struct DecodingOptions {
-  /// Counts that lie at or above this are saturated and tell nothing; 0: the pictures' own maximum
-  /// is not taken for saturation.
+  /// Counts that lie at or above this are saturated, which spoils a sinusoid; 0: none is.
   std::uint16_t full_scale = 0;
   /// A difference of two counts that is below so many of its standard deviations is no bit. 3: one
   /// of 400 differences of pure noise passes, and 20 of them would have to.
   double least_deviations = 3;
-  /// A pixel is lit if white exceeds black by this part of the 95th percentile of that excess (and
-  /// by twice `least_deviations`): what is less is light that came by way of other surfaces.
+  /// A pixel is lit if the light that comes to it straight from the projector, which is what bits
+  /// differ by, is above this part of that light's 95th percentile, and above four times
+  /// `least_deviations`. What is less came by way of other surfaces or cannot be told from noise.
   double least_lit = 0.03;
   /// A bit is unsure if its contrast is below this part of white minus black.
   double least_contrast = 0.1;
@@ -44,7 +44,7 @@ struct DecodedView {
   /// 0 where nothing was decoded, else up to 1: the least contrast of all bits relative to white
   /// minus black, after three deviations of noise were taken off.
   Image<float> confidence;
-  Image<std::uint8_t> lit;  ///< 1 where the projector's white makes a difference
+  Image<std::uint8_t> lit;  ///< 1 where the projector lights straight
   /// Of the lit pixels: those decoded.
   double decoded_ratio = 0;
   double lit_ratio = 0;  ///< of all pixels
@@ -52,7 +52,9 @@ struct DecodedView {
   /// modulates enough); 1 for white and black. A picture that was shown or grabbed wrongly stands
   /// out here.
   std::vector<double> pattern_ratio;
-  double noise_counts = 0;  ///< standard deviation of a count, estimated from the pictures
+  double noise_counts = 0;  ///< standard deviation of a lit pixel's count, from the pictures
+  /// What a position may be off by design: a Gray code's block, or a pixel with sinusoids.
+  double resolution_px = 1;
 };
 
 /// Errors: kInvalidOption (as many pictures as the plan says, all of one size, or else the text

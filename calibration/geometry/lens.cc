@@ -6,8 +6,7 @@
 namespace veneer::geometry {
 
 Eigen::Vector2d Lens::project(const Eigen::Vector3d& point) const {
-  if (!(point.z() > 0))
-    return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  if (!(point.z() > 0)) return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   const double x = point.x() / point.z();
   const double y = point.y() / point.z();
   const double r2 = x * x + y * y;
