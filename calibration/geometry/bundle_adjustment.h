@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include <optional>
+#include <filesystem>
 #include <span>
 #include <string>
 #include <vector>
@@ -30,13 +30,15 @@ struct GeometryOptions {
   int projector_height = 0;
   LensModel camera_model = LensModel::kRadial;
   LensModel projector_model = LensModel::kRadial;
-  /// Reports every count of good points alike: within loss_px nothing changes.
+  /// Huber's leaves a set whose points are all within loss_px as the plain squares have it.
   Loss loss = Loss::kHuber;
   double loss_px = 2;
   /// Views whose planes turn less than this against each other count as one orientation.
   double least_turn_deg = 5;
   /// A focal length whose standard deviation exceeds this part of it is refused.
   double most_focal_deviation = 0.05;
+  /// A fit that leaves more than this, root mean square in pixels, is refused: it is none.
+  double most_rms_px = 5;
   /// Repeat the fit without each view in turn.
   bool leave_one_out = true;
 
@@ -82,14 +84,14 @@ struct StartCheck {
   double disagreement = 0;
 };
 
-/// A projector as a plain pinhole, which is what a profile holds.
+/// A projector as a plain pinhole, which is what a profile holds: fitted with the camera and the
+/// views' poses where the full fit has them.
 struct PinholeProjector {
   Lens lens;  ///< without distortion
   RigidTransform projector_from_camera;
-  double projector_rms_px = 0;
-  double stereo_rms_px = 0;
-  /// Largest distance over the raster between where this and the full model send a pixel, projector
-  /// pixels, at the distance of the views.
+  double projector_rms_px = 0;  ///< to be compared with GeometryCalibration::projector_rms_px
+  /// Largest distance between where this and the full model send a point, projector pixels, over
+  /// the part of the raster that the views cover and at their mean distance.
   double most_off_px = 0;
 };
 
@@ -175,6 +177,6 @@ struct RigEvaluation {
 
 /// A calibration_result.xml as procam-calibration writes it (OpenCV's storage: cam_int, cam_dist,
 /// proj_int, proj_dist, "roration" or rotation, translation). Errors: kNotFound, kBadFormat.
-[[nodiscard]] Result<Rig> read_opencv_rig(const std::string& path);
+[[nodiscard]] Result<Rig> read_opencv_rig(const std::filesystem::path& path);
 
 }  // namespace veneer::geometry
