@@ -21,14 +21,24 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::string_view kFormat = "veneer-projector-profile";
-constexpr int kVersion = 2;  // 2 added the surface's map
+constexpr int kVersion = 3;  // 2 added the surface's map, 3 the colour residual and the record
 constexpr const char* kVignettingFile = "vignetting.exr";
 constexpr const char* kSurfaceMapFile = "surface_map.exr";
+constexpr const char* kResidualFile = "colour_residual.exr";
 constexpr std::array<std::string_view, 3> kChannelNames{"red", "green", "blue"};
 
 /// A matrix whose columns span less than this part of the box of their lengths counts as singular:
 /// real primaries and surfaces stay above 1e-2.
 constexpr double kLeastVolume = 1e-6;
+
+/// Pieces of sqrt(t) along each axis in which the colour residual is looked at. A finer grid's
+/// noise in the dark is no fold that anybody could see: the first of these pieces ends at t =
+/// 0.004.
+constexpr int kFoldCells = 16;
+/// What t -> t + rho(t) must leave of a piece's volume. Real projectors stay above 0.5.
+constexpr double kLeastResidualVolume = 1e-3;
+/// A fitted rho is a part of full drive; larger values are no colour model's.
+constexpr double kLargestResidual = 10.0;
 
 double to_double(float value) { return value; }
 Eigen::Vector3d to_double(const Rgb32f& value) { return value.cast<double>(); }
@@ -102,6 +112,100 @@ Status check_tone_curve(const std::vector<double>& curve, int bits, std::string_
   return {};
 }
 
+/// Whether t -> t + rho(t) turns a piece of the grid inside out. A piece is cut into six tetrahedra
+/// along its diagonal, one for each order in which the channels rise from its lowest corner.
+Status check_residual(const ColourResidual& rho) {
+  if (rho.empty()) return {};
+  if (!std::ranges::all_of(rho.values(), [](const Eigen::Vector3d& value) {
+        return value.allFinite() && value.cwiseAbs().maxCoeff() <= kLargestResidual;
+      }))
+    return fail(Errc::kBadFormat,
+                "the colour residual is not finite, or above {}, somewhere",
+                kLargestResidual);
+  const int cells = std::min(rho.nodes() - 1, kFoldCells);
+  const auto drive_at = [cells](const Eigen::Array3i& node) -> Eigen::Vector3d {
+    return (node.cast<double>() / cells).square().matrix();
+  };
+  const auto keeps_orientation = [&](const Eigen::Array3i& lowest,
+                                     const std::array<int, 3>& order) {
+    Eigen::Matrix3d drive_edges;
+    Eigen::Matrix3d image_edges;
+    Eigen::Array3i corner = lowest;
+    for (int i = 0; i < 3; ++i) {
+      const Eigen::Vector3d from = drive_at(corner);
+      ++corner[order[static_cast<std::size_t>(i)]];
+      const Eigen::Vector3d to = drive_at(corner);
+      drive_edges.col(i) = to - from;
+      image_edges.col(i) = to + rho(to) - from - rho(from);
+    }
+    return image_edges.determinant() / drive_edges.determinant() > kLeastResidualVolume;
+  };
+  for (int b = 0; b < cells; ++b) {
+    for (int g = 0; g < cells; ++g) {
+      for (int r = 0; r < cells; ++r) {
+        std::array<int, 3> order{0, 1, 2};
+        do {
+          if (keeps_orientation({r, g, b}, order)) continue;
+          const Eigen::Vector3d at = drive_at({r, g, b});
+          return fail(Errc::kBadFormat,
+                      "the colour residual folds drives onto one another near the linear drive "
+                      "{:.3f} {:.3f} {:.3f}, so that no drive can be found for a colour",
+                      at.x(),
+                      at.y(),
+                      at.z());
+        } while (std::next_permutation(order.begin(), order.end()));
+      }
+    }
+  }
+  return {};
+}
+
+bool is_utf8(const std::string& text) {
+  try {
+    static_cast<void>(Json(text).dump());  // throws on other bytes
+    return true;
+  } catch (const Json::exception&) {
+    return false;
+  }
+}
+
+Status check_record(const ProjectorProfile& p) {
+  bool valid = is_utf8(p.colour_model);
+  for (const auto& [key, value] : p.record) valid = valid && is_utf8(key) && is_utf8(value);
+  if (!valid)
+    return fail(Errc::kBadFormat, "the name of the colour model or the record is not UTF-8");
+  return {};
+}
+
+/// A row of nodes a row of pixels, from the darkest blue down.
+Image<Rgb32f> picture_of(const ColourResidual& rho) {
+  const int n = rho.nodes();
+  Image<Rgb32f> picture(n, n * n);
+  std::ranges::transform(rho.values(), picture.pixels().begin(), [](const Eigen::Vector3d& value) {
+    return Rgb32f(value.cast<float>());
+  });
+  return picture;
+}
+
+Result<ColourResidual> residual_from(const Image<Rgb32f>& picture) {
+  const int n = picture.width();
+  constexpr int kMostNodes = 129;  // ColourResidual's
+  if (n < 2 || n > kMostNodes || picture.height() != n * n)
+    return fail(Errc::kBadFormat,
+                "{} has {} x {} pixels instead of n x n^2 with n from 2 to {}",
+                kResidualFile,
+                n,
+                picture.height(),
+                kMostNodes);
+  std::vector<Eigen::Vector3d> values;
+  values.reserve(picture.pixels().size());
+  for (const Rgb32f& value : picture.pixels()) {
+    if (!value.allFinite()) return fail(Errc::kBadFormat, "{} is not finite", kResidualFile);
+    values.emplace_back(value.cast<double>());
+  }
+  return ColourResidual(n, std::move(values));
+}
+
 std::string checksum(std::string_view bytes) {
   const uLong crc = crc32_z(
       0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());  // NOLINT: zlib's type
@@ -148,6 +252,9 @@ Json contents_of(const ProjectorProfile& p) {
   json["surface_xyz"] = to_json(p.surface);
   json["has_surface_map"] = !p.surface_map.empty();
   json["ambient_xyz"] = to_json(p.ambient);
+  json["has_colour_residual"] = !p.residual.empty();
+  json["colour_model"] = p.colour_model;
+  json["record"] = p.record;
   return json;
 }
 
@@ -171,6 +278,8 @@ ProjectorProfile profile_from(const Json& json) {
   json.at("reference_distance_m").get_to(p.reference_distance_m);
   p.surface = matrix_from(json.at("surface_xyz"));
   p.ambient = vector_from(json.at("ambient_xyz"));
+  p.colour_model = json.value("colour_model", std::string());
+  p.record = json.value("record", std::map<std::string, std::string>());
   return p;
 }
 
@@ -179,6 +288,7 @@ struct Manifest {
   ProjectorProfile profile;  // without the maps
   std::string vignetting_checksum;
   std::optional<std::string> surface_map_checksum;  // none: the surface has no map
+  std::optional<std::string> residual_checksum;     // none: there is no residual
 };
 
 Result<Manifest> parse_manifest(const std::string& text) {
@@ -201,9 +311,11 @@ Result<Manifest> parse_manifest(const std::string& text) {
                   "profile.json was changed or damaged (its checksum differs); calibrate again");
     const Json& files = json.at("files");
     Manifest manifest{
-        profile_from(json.at("profile")), files.at(kVignettingFile).get<std::string>(), {}};
+        profile_from(json.at("profile")), files.at(kVignettingFile).get<std::string>(), {}, {}};
     if (json.at("profile").value("has_surface_map", false))
       manifest.surface_map_checksum = files.at(kSurfaceMapFile).get<std::string>();
+    if (json.at("profile").value("has_colour_residual", false))
+      manifest.residual_checksum = files.at(kResidualFile).get<std::string>();
     return manifest;
   } catch (const Json::exception& e) {
     return fail(Errc::kBadFormat, "profile.json: {}; calibrate again", e.what());
@@ -232,6 +344,11 @@ Result<ProjectorProfile> load_from(const std::filesystem::path& folder) {
     VENEER_TRY(verify_file(folder / kSurfaceMapFile, *manifest.surface_map_checksum));
     VENEER_ASSIGN(manifest.profile.surface_map, read_exr_rgb(folder / kSurfaceMapFile));
   }
+  if (manifest.residual_checksum) {
+    VENEER_TRY(verify_file(folder / kResidualFile, *manifest.residual_checksum));
+    VENEER_ASSIGN(const Image<Rgb32f> picture, read_exr_rgb(folder / kResidualFile));
+    VENEER_ASSIGN(manifest.profile.residual, residual_from(picture));
+  }
   VENEER_TRY(manifest.profile.check());
   return std::move(manifest.profile);
 }
@@ -246,6 +363,16 @@ Eigen::Vector3d ProjectorProfile::reflectance_at(const Eigen::Vector2d& pixel) c
   if (surface_map.empty()) return Eigen::Vector3d::Ones();
   return sample(surface_map, geometry, pixel);
 }
+
+Eigen::Vector3d ProjectorProfile::linear_drive(const std::array<std::uint16_t, 3>& code) const {
+  return {tone_curves[0].at(code[0]), tone_curves[1].at(code[1]), tone_curves[2].at(code[2])};
+}
+
+Xyz ProjectorProfile::emitted(const Eigen::Vector3d& linear_drive) const {
+  return primaries * (linear_drive + residual(linear_drive));
+}
+
+Xyz ProjectorProfile::white() const { return emitted(Eigen::Vector3d::Ones()) + black; }
 
 Status ProjectorProfile::check() const {
   VENEER_TRY(check_geometry(geometry));
@@ -270,10 +397,11 @@ Status ProjectorProfile::check() const {
                 "the surface's map is not finite, or not between {} and {}, somewhere",
                 kLeastReflectance,
                 1.0F / kLeastReflectance);
-  return {};
+  VENEER_TRY(check_residual(residual));
+  return check_record(*this);
 }
 
-Status ProjectorProfile::save(const std::filesystem::path& folder) const {
+Status ProjectorProfile::save(const std::filesystem::path& folder, const ExtraFiles& extra) const {
   const std::string doing = fmt::format("saving the projector profile {}", folder.string());
   if (const Status valid = check(); !valid) return fail_while(doing, valid.error());
   VENEER_ASSIGN(StagedFolder staged, StagedFolder::create(folder));
@@ -282,6 +410,11 @@ Status ProjectorProfile::save(const std::filesystem::path& folder) const {
   if (!surface_map.empty()) {
     VENEER_TRY(write_exr(staged.path() / kSurfaceMapFile, surface_map.view()));
     maps.push_back(kSurfaceMapFile);
+  }
+  if (!residual.empty()) {
+    const Image<Rgb32f> picture = picture_of(residual);
+    VENEER_TRY(write_exr(staged.path() / kResidualFile, picture.view()));
+    maps.push_back(kResidualFile);
   }
   Json json;
   json["format"] = kFormat;
@@ -293,6 +426,7 @@ Status ProjectorProfile::save(const std::filesystem::path& folder) const {
     json["files"][map] = checksum(bytes);
   }
   VENEER_TRY(write_text(staged.path() / "profile.json", json.dump(1) + "\n"));
+  if (extra) VENEER_TRY(extra(staged.path()));
   return staged.commit();
 }
 

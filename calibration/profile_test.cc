@@ -9,12 +9,15 @@
 
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <limits>
 #include <string>
 #include <utility>
 
 #include "base/files.h"
+#include "base/image_files.h"
+#include "base/random.h"
 
 namespace veneer::calibration {
 namespace {
@@ -47,6 +50,27 @@ ProjectorProfile example_with_map() {
   p.surface_map = Image<Rgb32f>(2, 3, Rgb32f(1.0F, 0.9F, 1.1F));
   p.surface_map(1, 2) = Rgb32f(1.0F / 3.0F, 0.02F, 2.5F);
   return p;
+}
+
+ProjectorProfile example_with_residual() {
+  ProjectorProfile p = example_with_map();
+  p.residual = ColourResidual::sampled(5, [](const Eigen::Vector3d& t) -> Eigen::Vector3d {
+    return t.minCoeff() * Eigen::Vector3d(0.2, 0.25, 1.0 / 3) - 0.05 * t.x() * t;
+  });
+  p.colour_model = "white segment";
+  p.record = {{"instrument", "a colorimeter, \u00b1 2 %"}, {"when", "2026-11-28T01:02:03Z"}};
+  return p;
+}
+
+/// Without waiting for the disk, as write_text() does: for tests that write often.
+void overwrite(const std::filesystem::path& path, const std::string& text) {
+  std::ofstream(path, std::ios::binary | std::ios::trunc) << text;
+}
+
+std::string json_checksum(const nlohmann::json& json) {
+  const std::string text = json.dump();
+  const auto crc = crc32_z(0, reinterpret_cast<const Bytef*>(text.data()), text.size());
+  return fmt::format("crc32:{:08x}", crc);
 }
 
 class ProfileTest : public ::testing::Test {
@@ -185,7 +209,7 @@ TEST_F(ProfileTest, AnotherFormatIsRefused) {
 TEST_F(ProfileTest, ANewerVersionIsRefusedAsNewer) {
   ASSERT_TRUE(example_profile().save(folder_));
   edit_json([](nlohmann::json& json) {
-    json["version"] = 3;
+    json["version"] = 4;
     json["profile"]["something_new"] =
         1;  // so the checksum differs too, but that is not the reason
   });
@@ -196,14 +220,181 @@ TEST_F(ProfileTest, OneFromBeforeSurfacesHadMapsIsRead) {
   ASSERT_TRUE(example_profile().save(folder_));
   edit_json([](nlohmann::json& json) {
     json["version"] = 1;
-    json["profile"].erase("has_surface_map");
-    const std::string text = json["profile"].dump();
-    const auto crc = crc32_z(0, reinterpret_cast<const Bytef*>(text.data()), text.size());
-    json["checksum"] = fmt::format("crc32:{:08x}", crc);
+    for (const char* key : {"has_surface_map", "has_colour_residual", "colour_model", "record"})
+      json["profile"].erase(key);
+    json["checksum"] = json_checksum(json["profile"]);
   });
   const auto loaded = ProjectorProfile::load(folder_);
   ASSERT_TRUE(loaded) << loaded.error().what;
   EXPECT_TRUE(loaded->surface_map.empty());
+}
+
+TEST_F(ProfileTest, OneFromBeforeColourHadAResidualIsRead) {
+  ASSERT_TRUE(example_with_map().save(folder_));
+  edit_json([](nlohmann::json& json) {
+    json["version"] = 2;
+    for (const char* key : {"has_colour_residual", "colour_model", "record"})
+      json["profile"].erase(key);
+    json["checksum"] = json_checksum(json["profile"]);
+  });
+  const auto loaded = ProjectorProfile::load(folder_);
+  ASSERT_TRUE(loaded) << loaded.error().what;
+  EXPECT_FALSE(loaded->surface_map.empty());
+  EXPECT_TRUE(loaded->residual.empty());
+  EXPECT_TRUE(loaded->colour_model.empty());
+  EXPECT_TRUE(loaded->record.empty());
+  const Eigen::Vector3d drive(0.2, 0.7, 0.4);
+  EXPECT_EQ(loaded->emitted(drive), loaded->primaries * drive);
+}
+
+TEST_F(ProfileTest, TheColourModelComesBackInSinglePrecision) {
+  const ProjectorProfile saved = example_with_residual();
+  ASSERT_TRUE(saved.save(folder_));
+  const auto loaded = ProjectorProfile::load(folder_);
+  ASSERT_TRUE(loaded) << loaded.error().what;
+  EXPECT_EQ(loaded->colour_model, saved.colour_model);
+  EXPECT_EQ(loaded->record, saved.record);
+  ASSERT_EQ(loaded->residual.nodes(), 5);
+  for (std::size_t i = 0; i < saved.residual.values().size(); ++i) {
+    EXPECT_EQ(loaded->residual.values()[i].cast<float>(), saved.residual.values()[i].cast<float>());
+  }
+  // And once more without a loss.
+  ASSERT_TRUE(loaded->save(folder_));
+  EXPECT_EQ(ProjectorProfile::load(folder_)->residual.values(), loaded->residual.values());
+}
+
+TEST_F(ProfileTest, ADamagedColourResidualIsRefused) {
+  ASSERT_TRUE(example_with_residual().save(folder_));
+  auto picture = read_text(folder_ / "colour_residual.exr");
+  ASSERT_TRUE(picture);
+  picture->back() ^= 1;
+  ASSERT_TRUE(write_text(folder_ / "colour_residual.exr", *picture));
+  expect_refused("colour_residual.exr was changed or damaged");
+}
+
+TEST_F(ProfileTest, AColourResidualOfAnotherShapeIsRefused) {
+  const auto replaced_by = [this](const Image<Rgb32f>& picture) {
+    ASSERT_TRUE(example_with_residual().save(folder_));
+    ASSERT_TRUE(write_exr(folder_ / "colour_residual.exr", picture.view()));
+    const std::string bytes = read_text(folder_ / "colour_residual.exr").value();
+    edit_json([&bytes](nlohmann::json& json) {
+      const auto crc = crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
+      json["files"]["colour_residual.exr"] = fmt::format("crc32:{:08x}", crc);
+    });
+  };
+  replaced_by(Image<Rgb32f>(4, 15, Rgb32f::Zero()));
+  expect_refused("4 x 15 pixels");
+  replaced_by(Image<Rgb32f>(1, 1, Rgb32f::Zero()));
+  expect_refused("1 x 1 pixels");
+  replaced_by(Image<Rgb32f>(130, 130 * 130, Rgb32f::Zero()));
+  expect_refused("130 x 16900 pixels");
+  Image<Rgb32f> no_number(3, 9, Rgb32f::Zero());
+  no_number(1, 7).y() = std::nanf("");
+  replaced_by(no_number);
+  expect_refused("not finite");
+  replaced_by(Image<Rgb32f>(3, 9, Rgb32f::Zero()));
+  EXPECT_TRUE(ProjectorProfile::load(folder_)) << "the shape is right";
+}
+
+TEST_F(ProfileTest, ExtraFilesAppearWithTheOthersOrNothingDoes) {
+  const auto extra = [](const std::filesystem::path& folder) -> Status {
+    EXPECT_TRUE(std::filesystem::exists(folder / "profile.json"));
+    return write_text(folder / "projector.icc", "colour");
+  };
+  ASSERT_TRUE(example_profile().save(folder_, extra));
+  EXPECT_EQ(read_text(folder_ / "projector.icc").value(), "colour");
+  ProjectorProfile newer = example_profile();
+  newer.reference_distance_m = 2.0;
+  const Status failed = newer.save(folder_, [](const std::filesystem::path&) -> Status {
+    return fail(Errc::kIo, "the disk is full");
+  });
+  ASSERT_FALSE(failed);
+  EXPECT_THAT(failed.error().what, HasSubstr("the disk is full"));
+  EXPECT_EQ(ProjectorProfile::load(folder_)->reference_distance_m, 1.2);
+}
+
+// A profile that was damaged at random is refused with a text, or it is a valid one all the same
+// (white space of profile.json): never a crash, and never one that does not pass its own check.
+TEST_F(ProfileTest, DamagedAtRandomItIsRefusedOrValid) {
+  ASSERT_TRUE(example_with_residual().save(folder_));
+  Pcg32 random(21);
+  int refused = 0;
+  constexpr int kTrials = 300;
+  for (int i = 0; i < kTrials; ++i) {
+    constexpr const char* kFiles[] = {
+        "profile.json", "vignetting.exr", "surface_map.exr", "colour_residual.exr"};
+    const std::filesystem::path path = folder_ / kFiles[random.next() % 4];
+    const std::string whole = read_text(path).value();
+    std::string damaged = whole;
+    if (random.next() % 4 == 0) {
+      damaged.resize(random.next() % damaged.size());
+    } else {
+      damaged[random.next() % damaged.size()] ^= static_cast<char>(1U << (random.next() % 8));
+    }
+    overwrite(path, damaged);
+    const auto loaded = ProjectorProfile::load(folder_);
+    if (loaded) {
+      EXPECT_TRUE(loaded->check()) << "trial " << i;
+    } else {
+      ++refused;
+      EXPECT_THAT(loaded.error().what, HasSubstr(folder_.string())) << "trial " << i;
+    }
+    overwrite(path, whole);
+  }
+  EXPECT_GT(refused, kTrials / 2);
+  EXPECT_TRUE(ProjectorProfile::load(folder_));
+}
+
+// The same with checksums made right again, as by somebody who edits by program.
+TEST_F(ProfileTest, WithWildValuesItIsRefusedOrValid) {
+  ASSERT_TRUE(example_with_residual().save(folder_));
+  const auto original = nlohmann::json::parse(read_text(folder_ / "profile.json").value());
+  const std::vector<nlohmann::json> wild{nullptr,
+                                         true,
+                                         "",
+                                         -1,
+                                         0,
+                                         1e308,
+                                         -1e308,
+                                         1 << 30,
+                                         0.5,
+                                         nlohmann::json::array(),
+                                         nlohmann::json::object(),
+                                         {1, 2},
+                                         {{"a", 1}}};
+  int refused = 0;
+  int tried = 0;
+  const nlohmann::json flat = original["profile"].flatten();
+  for (const auto& [pointer, value] : flat.items()) {
+    if (pointer.starts_with("/tone_curves") && !pointer.ends_with("/3")) continue;  // all alike
+    for (const nlohmann::json& instead : wild) {
+      nlohmann::json json = original;
+      json["profile"][nlohmann::json::json_pointer(pointer)] = instead;
+      json["checksum"] = json_checksum(json["profile"]);
+      overwrite(folder_ / "profile.json", json.dump());
+      const auto loaded = ProjectorProfile::load(folder_);
+      ++tried;
+      if (loaded) {
+        EXPECT_TRUE(loaded->check()) << pointer << " = " << instead;
+      } else {
+        ++refused;
+        EXPECT_THAT(loaded.error().what, HasSubstr(folder_.string()));
+      }
+    }
+  }
+  EXPECT_GT(refused, tried / 2);
+}
+
+TEST(ProfileWhite, IsFullDriveOverBlack) {
+  ProjectorProfile p = example_profile();
+  const Eigen::Vector3d one = Eigen::Vector3d::Ones();
+  EXPECT_TRUE(p.white().isApprox(p.primaries * one + p.black));
+  const Eigen::Vector3d segment(0.2, 0.3, 0.25);
+  p.residual = ColourResidual::sampled(
+      2, [&](const Eigen::Vector3d& t) -> Eigen::Vector3d { return t.minCoeff() * segment; });
+  EXPECT_TRUE(p.white().isApprox(p.primaries * (one + segment) + p.black));
+  EXPECT_EQ(p.emitted(Eigen::Vector3d::Zero()), Xyz::Zero());
+  EXPECT_EQ(p.linear_drive({0, 15, 0}), Eigen::Vector3d::UnitY());
 }
 
 TEST_F(ProfileTest, AChangedNumberIsRefused) {
@@ -235,6 +426,11 @@ struct Mistake {
 TEST(ProfileCheck, AcceptsTheExamples) {
   EXPECT_TRUE(example_profile().check());
   EXPECT_TRUE(example_with_map().check());
+  EXPECT_TRUE(example_with_residual().check());
+}
+
+ColourResidual residual(const std::function<Eigen::Vector3d(const Eigen::Vector3d&)>& rho) {
+  return ColourResidual::sampled(17, rho);
 }
 
 TEST(ProfileMaps, AreStretchedOverTheRasterBilinearly) {
@@ -304,6 +500,29 @@ TEST(ProfileCheck, RefusesEveryMistake) {
       {"map", [](ProjectorProfile& p) { p.surface_map(0, 0).x() = -1; }},
       {"map", [](ProjectorProfile& p) { p.surface_map(0, 0).y() = 0.5F * kLeastReflectance; }},
       {"map", [](ProjectorProfile& p) { p.surface_map(0, 0).z() = 2.0F / kLeastReflectance; }},
+      {"folds",
+       [](ProjectorProfile& p) {  // no light at all
+         p.residual = residual([](const Eigen::Vector3d& t) -> Eigen::Vector3d { return -t; });
+       }},
+      {"folds",
+       [](ProjectorProfile& p) {  // red falls from 0.5 on
+         p.residual = residual([](const Eigen::Vector3d& t) {
+           return Eigen::Vector3d(-2.0 * std::max(t.x() - 0.5, 0.0), 0.0, 0.0);
+         });
+       }},
+      {"folds",
+       [](ProjectorProfile& p) {  // green and blue change places: a mirror
+         p.residual = residual([](const Eigen::Vector3d& t) {
+           return Eigen::Vector3d(0.0, t.z() - t.y(), t.y() - t.z());
+         });
+       }},
+      {"residual is not finite, or above",
+       [](ProjectorProfile& p) {
+         p.residual = residual([](const Eigen::Vector3d& t) -> Eigen::Vector3d { return 11 * t; });
+       }},
+      {"UTF-8", [](ProjectorProfile& p) { p.colour_model = "\xff"; }},
+      {"UTF-8", [](ProjectorProfile& p) { p.record["when"] = "\xc3"; }},
+      {"UTF-8", [](ProjectorProfile& p) { p.record["\x80"] = "now"; }},
   };
   for (std::size_t i = 0; i < mistakes.size(); ++i) {
     ProjectorProfile profile = example_with_map();

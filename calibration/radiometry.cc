@@ -411,12 +411,9 @@ Xyz predict_reading(const ProjectorProfile& profile,
                     bool lit) {
   Xyz irradiance = profile.ambient;
   if (lit) {
-    Eigen::Vector3d output;
-    for (std::size_t c = 0; c < 3; ++c)
-      output[static_cast<Eigen::Index>(c)] = profile.tone_curves[c].at(code[c]);
+    const Xyz emitted = profile.emitted(profile.linear_drive(code));
     const double slant = std::pow(axis_cosine(profile.geometry, pixel), 3);
-    irradiance +=
-        slant * profile.vignetting_at(pixel) * (profile.primaries * output + profile.black);
+    irradiance += slant * profile.vignetting_at(pixel) * (emitted + profile.black);
   }
   if (target == Target::kWhiteReference) return irradiance;
   const Eigen::Vector3d in_primaries = profile.primaries.inverse() * irradiance;

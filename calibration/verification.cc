@@ -37,7 +37,7 @@ Result<ProfileVerification> verify_profile(Colorimeter& colorimeter,
     return fail(Errc::kInvalidOption, "verifying a profile: there are no patches");
   if (const Status valid = profile.check(); !valid)
     return fail_while("verifying a profile", valid.error());
-  const Xyz white = profile.primaries.rowwise().sum() + profile.black;
+  const Xyz white = profile.white();
 
   ProfileVerification verification;
   progress.start("verifying the profile", static_cast<std::int64_t>(patches.size()));

@@ -139,7 +139,7 @@ Status add_pictures(const Scenario& scenario,
   VENEER_ASSIGN(const auto profile, calibration::ProjectorProfile::load(profile_path));
   VENEER_ASSIGN(const auto material, btf::load_material(material_path));
   VENEER_ASSIGN(const auto renderer, render::Renderer::create(scene, *material, profile, {}));
-  const Xyz white = profile.primaries.rowwise().sum();
+  const Xyz white = profile.emitted(Eigen::Vector3d::Ones());
   Image<Rgb32f> right(profile.geometry.width, profile.geometry.height);
   std::vector<double>& differences = run.quantities["picture_de00"];
   differences.assign(run.seconds.size(), kNone);
