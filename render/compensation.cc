@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/ipt.h"
 #include "render/dither.h"
-#include "render/ipt.h"
 
 namespace veneer::render {
 namespace {

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <limits>
 
+#include "base/ipt.h"
 #include "base/random.h"
 #include "render/dither.h"
 #include "render/internal_testing.h"
-#include "render/ipt.h"
 
 namespace veneer::render {
 namespace {
@@ -322,20 +322,6 @@ TEST(Compensation, SwitchedOffShowsPlainSrgb) {
       // Rounded in linear light, so up to a little more than half a code from the encoded value.
       EXPECT_NEAR(pixel.codes[static_cast<std::size_t>(c)], encoded, 0.55) << rgb.transpose();
     }
-  }
-}
-
-TEST(Ipt, PutsWhiteAndGreysOnTheAxisAndReturns) {
-  const Vector3d d65(0.9505, 1.0, 1.0890);
-  // The published matrices have four digits.
-  constexpr double kPublishedDigits = 2e-3;
-  EXPECT_LT((ipt_from_cones(cones_from_xyz() * d65) - Ipt(1, 0, 0)).norm(), kPublishedDigits);
-  EXPECT_LT((ipt_from_cones(Vector3d::Constant(0.2)) - Ipt(std::pow(0.2, 0.43), 0, 0)).norm(),
-            1e-12);
-  Pcg32 random(7);
-  for (int i = 0; i < 200; ++i) {
-    const Vector3d cones = 2.0 * random_drive(random) - Vector3d::Constant(0.5);
-    EXPECT_LT((cones_from_ipt(ipt_from_cones(cones)) - cones).norm(), 1e-9) << cones.transpose();
   }
 }
 

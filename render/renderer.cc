@@ -3,12 +3,12 @@
 
 #include <cmath>
 
+#include "base/ipt.h"
 #include "render/compensate_pass.h"
 #include "render/compensation.h"
 #include "render/draw_pass.h"
 #include "render/egl_context.h"
 #include "render/gpu_timer.h"
-#include "render/ipt.h"
 #include "render/mesh_buffers.h"
 
 namespace veneer::render {

@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-namespace veneer::render {
+namespace veneer {
 
 /// Colours in IPT: I lightness, P red to green, T yellow to blue; lines of equal hue are straight
 /// and run from the axis P = T = 0. White is (1, 0, 0).
@@ -22,4 +22,4 @@ inline constexpr double kIptExponent = 0.43;
 [[nodiscard]] Ipt ipt_from_cones(const Eigen::Vector3d& cones);
 [[nodiscard]] Eigen::Vector3d cones_from_ipt(const Ipt& ipt);
 
-}  // namespace veneer::render
+}  // namespace veneer

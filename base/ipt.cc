@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/ipt.h"
+#include "base/ipt.h"
 
 #include <Eigen/LU>
 
 #include <cmath>
 
-namespace veneer::render {
+namespace veneer {
 namespace {
 
 Eigen::Vector3d signed_power(const Eigen::Vector3d& values, double exponent) {
@@ -52,4 +52,4 @@ Eigen::Vector3d cones_from_ipt(const Ipt& ipt) {
   return signed_power(kPowersFromIpt * ipt, 1.0 / kIptExponent);
 }
 
-}  // namespace veneer::render
+}  // namespace veneer
