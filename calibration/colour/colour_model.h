@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -34,6 +35,14 @@ class ColourModel {
   [[nodiscard]] virtual Eigen::Matrix3d jacobian(const Eigen::Vector3d& drive) const = 0;
   /// Whether forward(r, g, b) = forward(r, 0, 0) + forward(0, g, 0) + forward(0, 0, b).
   [[nodiscard]] virtual bool is_additive() const = 0;
+  /// Numbers that were fitted.
+  [[nodiscard]] virtual int parameters() const = 0;
+  /// A drive in [0, 1]^3 whose forward() is `xyz`, for models that can tell it without searching
+  /// from a start; nothing where the model cannot, or where the colour is out of its reach.
+  [[nodiscard]] virtual std::optional<Eigen::Vector3d> direct_inverse(const Xyz& xyz) const {
+    (void)xyz;
+    return std::nullopt;
+  }
 };
 
 /// One line of the registry of models.
