@@ -69,6 +69,36 @@ double CubicHermite::operator()(double x) const {
          t * t * ((1.0 + 2.0 * s) * y_[after] - s * width * slope_[after]);
 }
 
+double CubicHermite::slope_at(double x) const {
+  if (x <= x_.front()) return slope_.front();
+  if (x >= x_.back()) return slope_.back();
+  const auto after = static_cast<std::size_t>(std::ranges::upper_bound(x_, x) - x_.begin());
+  const std::size_t i = after - 1;
+  const double width = x_[after] - x_[i];
+  const double t = (x - x_[i]) / width;
+  const double s = 1.0 - t;
+  return 6.0 * s * t * (y_[after] - y_[i]) / width + s * (1.0 - 3.0 * t) * slope_[i] +
+         t * (3.0 * t - 2.0) * slope_[after];
+}
+
+PiecewiseLinear::PiecewiseLinear(std::vector<double> x, std::vector<double> y)
+    : x_(std::move(x)), y_(std::move(y)) {
+  VENEER_CHECK(x_.size() >= 2 && x_.size() == y_.size());
+  VENEER_CHECK(std::ranges::adjacent_find(x_, std::ranges::greater_equal{}) == x_.end());
+}
+
+std::size_t PiecewiseLinear::piece_at(double x) const {
+  const auto after = static_cast<std::size_t>(std::ranges::upper_bound(x_, x) - x_.begin());
+  return std::clamp<std::size_t>(after, 1, x_.size() - 1) - 1;
+}
+
+double PiecewiseLinear::operator()(double x) const {
+  const std::size_t i = piece_at(x);
+  return y_[i] + secant(x_, y_, i) * (x - x_[i]);
+}
+
+double PiecewiseLinear::slope_at(double x) const { return secant(x_, y_, piece_at(x)); }
+
 std::vector<double> nearest_rising(const std::vector<double>& values) {
   struct Pool {
     double sum;

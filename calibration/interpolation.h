@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 namespace veneer::calibration {
 
 /// How the slopes at the knots of a CubicHermite are chosen.
 enum class Slopes {
-  kSmooth,    ///< of the parabola through three neighbours: second order, may overshoot
+  kSmooth,    ///< of the parabola through three neighbours: second order, may overshoot; the
+              ///< curve is linear in the values, so that it does not mind a change of basis
   kMonotone,  ///< the same, limited so that the curve rises and falls only where the data do
 };
 
@@ -20,11 +22,29 @@ class CubicHermite {
   CubicHermite(std::vector<double> x, std::vector<double> y, Slopes slopes);
   /// The value at `x`; beyond the knots the straight line that leaves the last one.
   [[nodiscard]] double operator()(double x) const;
+  /// The derivative at `x`.
+  [[nodiscard]] double slope_at(double x) const;
 
  private:
   std::vector<double> x_;
   std::vector<double> y_;
   std::vector<double> slope_;
+};
+
+/// Straight pieces through given knots.
+class PiecewiseLinear {
+ public:
+  /// As CubicHermite.
+  PiecewiseLinear(std::vector<double> x, std::vector<double> y);
+  /// The value at `x`; beyond the knots the first or last piece goes on.
+  [[nodiscard]] double operator()(double x) const;
+  /// The slope at `x`; at a knot that of the piece to its right.
+  [[nodiscard]] double slope_at(double x) const;
+
+ private:
+  [[nodiscard]] std::size_t piece_at(double x) const;
+  std::vector<double> x_;
+  std::vector<double> y_;
 };
 
 /// The rising sequence nearest to `values` in least squares, all with equal weight.

@@ -66,6 +66,57 @@ TEST(CubicHermite, ContinuesStraightBeyondItsKnots) {
   EXPECT_NEAR(line(4.0), 9.0, kRounding);
 }
 
+TEST(CubicHermite, SlopeIsTheDerivativeInsideAndBeyond) {
+  Pcg32 random(5);
+  const std::vector<double> x = random_knots(random, 10);
+  std::vector<double> y(10);
+  for (double& value : y) value = random.uniform();
+  for (const Slopes slopes : {Slopes::kSmooth, Slopes::kMonotone}) {
+    const CubicHermite curve(x, y, slopes);
+    constexpr double kStep = 1e-5;
+    constexpr double kDifference = 1e-6;  // the quotient's error: step^2, rounding / step
+    for (double t = x.front() - 0.3; t < x.back() + 0.3; t += 0.0137)
+      EXPECT_NEAR(
+          curve.slope_at(t), (curve(t + kStep) - curve(t - kStep)) / (2 * kStep), 1e3 * kStep)
+          << t;
+    for (double t = x.front() + 0.01; t < x.front() + 0.04; t += 0.007)
+      EXPECT_NEAR(
+          curve.slope_at(t), (curve(t + kStep) - curve(t - kStep)) / (2 * kStep), kDifference)
+          << t;
+  }
+}
+
+TEST(CubicHermite, SmoothSlopesAreLinearInTheValues) {
+  Pcg32 random(6);
+  const std::vector<double> x = random_knots(random, 10);
+  std::vector<double> a(10);
+  std::vector<double> b(10);
+  std::vector<double> mixed(10);
+  for (std::size_t i = 0; i < 10; ++i) {
+    a[i] = random.normal();
+    b[i] = random.normal();
+    mixed[i] = 0.3 * a[i] - 2.0 * b[i];
+  }
+  const CubicHermite of_a(x, a, Slopes::kSmooth);
+  const CubicHermite of_b(x, b, Slopes::kSmooth);
+  const CubicHermite of_mixed(x, mixed, Slopes::kSmooth);
+  for (double t = -0.5; t <= x.back() + 0.5; t += 0.01)
+    EXPECT_NEAR(of_mixed(t), 0.3 * of_a(t) - 2.0 * of_b(t), 100 * kRounding) << t;
+}
+
+TEST(PiecewiseLinear, IsStraightBetweenKnotsAndGoesOnBeyond) {
+  const PiecewiseLinear line({0.0, 1.0, 3.0}, {0.0, 2.0, 3.0});
+  EXPECT_NEAR(line(0.25), 0.5, kRounding);
+  EXPECT_NEAR(line(1.0), 2.0, kRounding);
+  EXPECT_NEAR(line(2.0), 2.5, kRounding);
+  EXPECT_NEAR(line(-1.0), -2.0, kRounding);
+  EXPECT_NEAR(line(5.0), 4.0, kRounding);
+  EXPECT_NEAR(line.slope_at(-1.0), 2.0, kRounding);
+  EXPECT_NEAR(line.slope_at(1.0), 0.5, kRounding);
+  EXPECT_NEAR(line.slope_at(9.0), 0.5, kRounding);
+  EXPECT_TRUE(std::isnan(line(std::nan(""))));
+}
+
 TEST(NearestRising, LeavesRisingSequencesAlone) {
   const std::vector<double> rising{-1.0, 0.0, 0.0, 2.5};
   EXPECT_EQ(nearest_rising(rising), rising);
