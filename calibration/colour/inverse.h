@@ -3,11 +3,11 @@
 
 #include <Eigen/Core>
 
-#include <array>
 #include <vector>
 
 #include "base/result.h"
 #include "calibration/colour/colour_model.h"
+#include "calibration/colour/tone_table.h"
 
 namespace veneer::calibration {
 
@@ -56,19 +56,18 @@ class ColourInverse {
   };
   [[nodiscard]] Solution solve(const Xyz& target) const;
   [[nodiscard]] Solution descend(const Xyz& target, const Eigen::Vector3d& start) const;
-  [[nodiscard]] Eigen::Vector3d drive_of(const Eigen::Vector3d& linear) const;
+  /// M^-1 F over the linear drive.
+  [[nodiscard]] Eigen::Vector3d light_of(const Eigen::Vector3d& linear) const;
   void map_to_gamut(const Xyz& target, InverseColour& result) const;
   [[nodiscard]] double residual_of(const Xyz& target, const Eigen::Vector3d& drive) const;
 
   const ColourModel* model_;
   Xyz black_;
   Xyz white_ = Xyz::Ones();  ///< of full drive, above black
-  Eigen::Matrix3d linear_from_xyz_ = Eigen::Matrix3d::Identity();
-  /// Per channel: t at equally spaced drives, strictly rising, 0 to 1.
-  std::array<std::vector<double>, 3> tone_curves_;
+  ToneTable tones_;          ///< strictly rising
   struct GridPoint {
     Eigen::Vector3d linear;
-    Eigen::Vector3d colour;  ///< M^-1 F
+    Eigen::Vector3d light;  ///< light_of(linear)
   };
   std::vector<GridPoint> grid_;
   double darkest_neutral_ = 0;  ///< in parts of white, IPT's lightness

@@ -13,8 +13,7 @@
 
 namespace veneer::calibration {
 
-/// Colour differences of a model from readings: CIEDE2000, black in both, the white that of full
-/// drive (docs/CONVENTIONS.md).
+/// Colour differences of a model from readings: CIEDE2000, black in both (docs/CONVENTIONS.md).
 struct ColourError {
   int patches = 0;
   double mean = 0;
@@ -22,10 +21,11 @@ struct ColourError {
   double max = 0;
 };
 
-/// @param readings  black still in them.
+/// @param readings  black still in them.   @param white  what full drive sends, black included.
 [[nodiscard]] ColourError colour_error(const ColourModel& model,
                                        std::span<const PatchReading> readings,
-                                       const Xyz& black);
+                                       const Xyz& black,
+                                       const Xyz& white);
 
 /// How one family did.
 struct ColourCandidate {
@@ -51,7 +51,8 @@ inline constexpr double kWorthMoreParameters = 0.05;
 /// among those within kWorthMoreParameters of it, the one with the fewest parameters.
 ///
 /// Where the channels do not add up, only families that model interaction are fitted; where that
-/// is not decisive, all are. A family that cannot be fitted is listed with the reason.
+/// is not decisive, all are. A family that cannot be fitted is listed with the reason. The white is
+/// the mean reading at full drive; where there is none, the sum of the channels at full drive.
 /// @param fitted  as ColourModelFamily::fit wants them; all families get all of them.
 /// @param held_out  at least one; those whose drive is in `fitted` are left out.
 /// Errors: kBadFormat (no family could be fitted, nothing is held out, a reading that is not

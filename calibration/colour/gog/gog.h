@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "calibration/colour/colour_model.h"
+
+namespace veneer::calibration {
+
+/// Gain, offset and exponent per channel, and a matrix: 15 numbers. For projectors that follow a
+/// power; an S-shaped curve is out of its reach.
+///
+/// Offset and exponent of a channel are searched on grids that get finer, the primary follows in
+/// closed form; errors are weighted as lightness sees them (perceptual_weight()).
+/// Errors: those of read_ramps().
+[[nodiscard]] Result<std::unique_ptr<ColourModel>> fit_gog(std::span<const PatchReading> patches,
+                                                           const Xyz& black);
+
+/// How much an error in a reading weighs: lightness goes with the cube root of the light, so its
+/// slope is light^(-2/3). @param light  in parts of full output, >= 0.
+[[nodiscard]] double perceptual_weight(double light);
+
+}  // namespace veneer::calibration
