@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "cli/commands/bench_colour.h"
 #include "cli/commands/bench_fit.h"
 #include "cli/commands/bench_query.h"
 #include "cli/commands/bench_render.h"
@@ -18,9 +19,10 @@ Result<int> run_bench(CommandLine& line) {
          "what",
          what,
          "render: what drawing a frame costs with each model; fit: what finding clusters in "
-         "a basis gains; query: what asking for a pose costs")
+         "a basis gains; query: what asking for a pose costs; colour: how far each colour model is "
+         "from invented projectors")
       ->required()
-      ->check(CLI::IsMember({"fit", "query", "render"}));
+      ->check(CLI::IsMember({"colour", "fit", "query", "render"}));
   app.add_option("set",
                  set,
                  "The sample set, NAME.btfset; render takes a small synthetic one by itself, and "
@@ -62,6 +64,7 @@ Result<int> run_bench(CommandLine& line) {
     VENEER_ASSIGN(render.evaluation, render::parse_evaluation(evaluation));
     return bench_render(render, line);
   }
+  if (what == "colour") return bench_colour(line);
   if (what == "query") return bench_query(line);
   if (set.empty()) return fail(Errc::kInvalidOption, "bench fit: name a sample set, NAME.btfset");
   VENEER_ASSIGN(const btf::Model* model, btf::find_model(model_name));
