@@ -29,7 +29,13 @@ ABOVE_ALL_FLOORS = ("tests", "benchmarks")
 # What the virtual bench must not know of, and which of its files are the adaptors that do: they
 # give the bench the faces of the HAL.
 BENCH_PHYSICS = ("simulation/bench.h", "simulation/bench/*")
-BENCH_ADAPTORS = ("simulation/bench/colorimeter*", "simulation/bench/*_test.cc")
+BENCH_ADAPTORS = (
+    "simulation/bench/camera*",
+    "simulation/bench/colorimeter*",
+    "simulation/bench/registration*",
+    "simulation/bench/rig*",
+    "simulation/bench/*_test.cc",
+)
 JUDGED_BY_BENCH = ("render/", "calibration/")
 
 # Headers that would make every user of a module depend on a driver's, and the headers of ours that
