@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "base/colour.h"
@@ -99,13 +100,14 @@ struct Comparison {
 /// calibration/. Thread-safe after construction.
 ///
 /// The light of one surface point is, per wavelength,
-///   L = albedo [ G (sum over channels of output * primary + black) + ambient ],
+///   L = albedo [ G (sum over outputs of output * primary + black) + ambient ],
 ///   G = cos(theta_p) (r_ref / r)^2 vignetting(pixel),
 /// with theta_p and r the slant and the distance of the lens (a point), primary, black and ambient
 /// the radiance of a perfect diffuser, G = 0 in shadow and off the raster. Raster pixels are boxes:
 /// a point gets the (blurred) light of the pixel whose box its ray leaves through. The surface is
-/// Lambertian and of one albedo, so that summing the bands once, before geometry, is exact. Left
-/// out: light between parts of a concave object, light scattered in the lens beyond the blur.
+/// Lambertian and of one albedo, so that summing the bands once, before geometry, is exact. The
+/// lamp is settled, except where a light is asked for with a part of it. Left out: light between
+/// parts of a concave object, light scattered in the lens beyond the blur.
 class Bench {
  public:
   /// Errors: those of BenchTruth::load and load_mesh.
@@ -115,6 +117,7 @@ class Bench {
   ~Bench();
 
   [[nodiscard]] const BenchTruth& truth() const;
+  [[nodiscard]] const Mesh& mesh() const;
 
   /// Traces an eye's picture of the object: BenchTruth::eye.samples^2 rays a pixel, on a regular
   /// grid. A ray counts as lit where G > 0.
@@ -159,12 +162,17 @@ class Bench {
   /// What a flat board sends that stands square to the projector's axis, its plane at the reference
   /// distance, in the spot of a raster pixel (anywhere on the plane), the whole raster in one code.
   /// The spot is larger than the blur. XYZ in cd/m^2.
-  /// @param code  below 2^bits.   @param lit  false: the lamp is off.   @param of_object  the board
-  /// is of the object's material, else a perfect diffuser.
+  /// @param code  below 2^bits.   @param lamp  in parts of its settled light; 0: it is off.
+  /// @param of_object  the board is of the object's material, else a perfect diffuser.
   [[nodiscard]] Xyz board(const Rgb16& code,
                           const Eigen::Vector2d& pixel,
-                          bool lit,
+                          double lamp,
                           bool of_object) const;
+
+  /// Where the middle of what a raster position lights lies on the object, in the world; nothing
+  /// where that is past the object. @param pixel  on the raster.
+  [[nodiscard]] std::optional<Eigen::Vector3d> lit_point(const RigidTransform& world_from_object,
+                                                         const Eigen::Vector2d& pixel) const;
 
  private:
   struct State;

@@ -13,22 +13,15 @@
 namespace veneer::simulation {
 namespace {
 
-/// XYZ of what a surface of the given albedo sends for output 1 of each channel, for black (both at
-/// G = 1) and for the ambient light.
 SurfaceLight surface_light(const VirtualProjector& projector,
                            const Spectrum& ambient,
                            const Spectrum& albedo) {
   SurfaceLight light;
-  for (std::size_t c = 0; c < 3; ++c)
-    light.primaries.col(static_cast<Eigen::Index>(c)) = xyz_of(albedo * projector.primaries()[c]);
+  for (int i = 0; i < VirtualProjector::kOutputs; ++i)
+    light.outputs.col(i) = xyz_of(albedo * projector.primaries()[static_cast<std::size_t>(i)]);
   light.black = xyz_of(albedo * projector.black());
   light.ambient = xyz_of(albedo * ambient);
   return light;
-}
-
-Spectrum ambient_spectrum(const RoomTruth& room) {
-  const Spectrum shape = planckian_spectrum(room.ambient_kelvin);
-  return shape * (room.ambient_nits / xyz_of(shape).y());
 }
 
 /// The length of an eye pixel's side at distance 1 along the line of sight.
@@ -49,10 +42,12 @@ Bench::State::State(const BenchTruth& bench_truth, Mesh object)
     : truth(bench_truth),
       projector(truth.projector),
       mesh(std::move(object)),
-      on_white(surface_light(projector, ambient_spectrum(truth.room), Spectrum::Ones())),
+      on_white(surface_light(projector,
+                             planckian_light(truth.room.ambient_kelvin, truth.room.ambient_nits),
+                             Spectrum::Ones())),
       on_object(surface_light(
           projector,
-          ambient_spectrum(truth.room),
+          planckian_light(truth.room.ambient_kelvin, truth.room.ambient_nits),
           interpolated_spectrum(truth.object.wavelength_nm, truth.object.reflectance))) {}
 
 /// Which raster pixel lights a surface point, and how strongly.
@@ -92,6 +87,7 @@ Result<std::unique_ptr<Bench>> Bench::create(const BenchTruth& truth, Mesh mesh)
 }
 
 const BenchTruth& Bench::truth() const { return state_->truth; }
+const Mesh& Bench::mesh() const { return state_->mesh.mesh(); }
 
 Result<EyeView> Bench::look(const RigidTransform& world_from_object,
                             const Eigen::Vector3d& eye_in_world) const {
@@ -157,11 +153,11 @@ Result<EyeView> Bench::look(const RigidTransform& world_from_object,
 }
 
 Result<Image<Rgb32f>> Bench::observe(const EyeView& view, ImageView<const Rgb16> codes) const {
-  VENEER_ASSIGN(const Image<Rgb32f> light, state_->projector.project(codes));
+  VENEER_ASSIGN(const Image<VirtualProjector::Light> light, state_->projector.project(codes));
   Image<Rgb32f> picture(view.width(), view.height(), Rgb32f::Zero());
   const SurfaceLight& surface = state_->on_object;
   for (std::size_t pixel = 0; pixel + 1 < view.first.size(); ++pixel) {
-    Eigen::Vector3d output = Eigen::Vector3d::Zero();
+    VirtualProjector::Outputs output = VirtualProjector::Outputs::Zero();
     double geometry = 0;
     for (std::uint32_t i = view.first[pixel]; i < view.first[pixel + 1]; ++i) {
       const EyeSample& sample = view.samples[i];
@@ -172,7 +168,7 @@ Result<Image<Rgb32f>> Bench::observe(const EyeView& view, ImageView<const Rgb16>
     }
     const double on_object = view.first[pixel + 1] - view.first[pixel];
     const Xyz sum =
-        surface.primaries * output + geometry * surface.black + on_object * surface.ambient;
+        surface.outputs * output + geometry * surface.black + on_object * surface.ambient;
     picture.pixels()[pixel] = (sum / view.rays_per_pixel).cast<float>();
   }
   return picture;
@@ -235,15 +231,31 @@ Image<Rgb32f> Bench::material_truth(const EyeView& view,
   return picture;
 }
 
-Xyz Bench::board(const Rgb16& code, const Eigen::Vector2d& pixel, bool lit, bool of_object) const {
+Xyz Bench::board(const Rgb16& code,
+                 const Eigen::Vector2d& pixel,
+                 double lamp,
+                 bool of_object) const {
   const SurfaceLight& surface = of_object ? state_->on_object : state_->on_white;
-  if (!lit) return surface.ambient;
   const VirtualProjector& projector = state_->projector;
   const double cosine = projector.axis_cosine(pixel);
   const double distance = state_->truth.projector.reference_distance_m / cosine;
   const double fall_off = std::pow(state_->truth.projector.reference_distance_m / distance, 2);
   const double geometry = cosine * fall_off * projector.vignetting(pixel);
-  return geometry * (surface.primaries * projector.output(code) + surface.black) + surface.ambient;
+  return lamp * geometry * (surface.outputs * projector.output(code) + surface.black) +
+         surface.ambient;
+}
+
+std::optional<Eigen::Vector3d> Bench::lit_point(const RigidTransform& world_from_object,
+                                                const Eigen::Vector2d& pixel) const {
+  const ProjectorTruth& projector = state_->truth.projector;
+  const Eigen::Vector2d slope =
+      (pixel - projector.principal_point).cwiseQuotient(projector.focal_px);
+  const RigidTransform object_from_projector =
+      world_from_object.inverse() * projector.world_from_projector;
+  const auto hit = state_->mesh.trace(object_from_projector.translation,
+                                      object_from_projector.rotation * slope.homogeneous());
+  if (!hit) return std::nullopt;
+  return world_from_object * state_->mesh.at(*hit).position;
 }
 
 }  // namespace veneer::simulation

@@ -37,7 +37,11 @@ class RadialDistortion {
 [[nodiscard]] Eigen::Vector3d board_corner(const BoardTruth& board, int column, int row);
 
 /// The reflectance of a point of the board's plane; 0 off the board.
-[[nodiscard]] double board_reflectance(const BoardTruth& board, const Eigen::Vector2d& point);
+/// @param width  of the box, along x and y in metres, over which the chequers are averaged; 0 for
+///               none.
+[[nodiscard]] double board_reflectance(const BoardTruth& board,
+                                       const Eigen::Vector2d& point,
+                                       const Eigen::Vector2d& width = {0, 0});
 
 /// Where a camera sees a point, with distortion, pixels; anywhere, on its picture or not.
 /// @param x_in_world  in front of the camera.
@@ -63,8 +67,10 @@ class BoardView {
   /// Mean light of every pixel, row by row.
   /// @param raster  light of every raster pixel on a perfect diffuser at G = 1, black included, in
   ///                any unit, as the camera's three channels see it.
-  /// @param ambient  the same of the ambient light.
-  [[nodiscard]] Image<Rgb32f> gather(const Image<Rgb32f>& raster, const Rgb32f& ambient) const;
+  /// @param lamp  part of that light.   @param ambient  the same of the ambient light.
+  [[nodiscard]] Image<Rgb32f> gather(const Image<Rgb32f>& raster,
+                                     float lamp,
+                                     const Rgb32f& ambient) const;
 
  private:
   struct Sample {

@@ -17,8 +17,9 @@
 namespace veneer::simulation {
 
 /// The bench's camera: it sees the board, lit by what the display shows and by the ambient light;
-/// around the board is black. The same pictures for the same seed. A grab passes 0.1 s of the
-/// bench's time, or the exposure where that is longer.
+/// around the board is black. Counts are cut at 0 and at full scale; there is no offset. The same
+/// pictures for the same seed. A grab passes 0.1 s of the bench's time, or the exposure where that
+/// is longer.
 class VirtualCamera final : public capture::Camera {
  public:
   /// @param bench, display  borrowed; must outlive the camera.
@@ -40,10 +41,11 @@ class VirtualCamera final : public capture::Camera {
   void remove_board();
 
  private:
+  static constexpr double kFirstExposure_s = 0.005;
   VirtualCamera(const Bench& bench,
                 VirtualPatchDisplay& display,
                 std::vector<RigidTransform> poses);
-  void light_raster();
+  [[nodiscard]] Status light_raster();
 
   const Bench& bench_;
   VirtualPatchDisplay& display_;
@@ -57,7 +59,7 @@ class VirtualCamera final : public capture::Camera {
   Rgb32f seen_ambient_;
   std::uint64_t lit_picture_ = 0;  // the display's picture that raster_ is of
   Image<Rgb32f> raster_;           // as the camera's channels see it, lamp settled
-  double exposure_s_ = 0.005;
+  double exposure_s_;
   std::uint64_t grabs_ = 0;
   std::vector<float> deviates_;  // a table of normal ones
 };

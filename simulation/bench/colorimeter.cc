@@ -2,9 +2,15 @@
 #include "simulation/bench/colorimeter.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace veneer::simulation {
+namespace {
+
+constexpr double kReading_s = 1;  // what a filter colorimeter takes for one
+
+}  // namespace
 
 Status VirtualPatchDisplay::show(const std::array<std::uint16_t, 3>& code, bool lit) {
   const int full = (1 << bench_.truth().projector.bits) - 1;
@@ -18,6 +24,7 @@ Status VirtualPatchDisplay::show(const std::array<std::uint16_t, 3>& code, bool 
   code_ = code;
   lit_ = lit;
   picture_ = {};
+  ++shown_;
   return {};
 }
 
@@ -45,7 +52,23 @@ Status VirtualPatchDisplay::show_picture(ImageView<const Rgb16> codes) {
   }
   picture_ = std::move(picture);
   lit_ = true;
+  ++shown_;
   return {};
+}
+
+double VirtualPatchDisplay::lamp() const {
+  if (!lit_) return 0;
+  const ProjectorTruth& projector = bench_.truth().projector;
+  const double on_s = to_seconds(now().time_since_epoch());
+  return 1.0 - projector.lamp_drift * std::exp(-on_s / projector.lamp_settling_s);
+}
+
+VirtualColorimeterOptions options_from(const InstrumentTruth& truth) {
+  return {truth.relative_noise,
+          truth.dark_noise_nits,
+          truth.seed,
+          truth.drift_per_hour,
+          truth.matrix_error};
 }
 
 Result<Xyz> VirtualColorimeter::read(calibration::Target target, const Eigen::Vector2d& pixel) {
@@ -57,9 +80,16 @@ Result<Xyz> VirtualColorimeter::read(calibration::Target target, const Eigen::Ve
                 "reading a patch on the bench: pixel {}, {} is off the raster",
                 pixel.x(),
                 pixel.y());
+  display_.pass(kReading_s);
+  const Image<Rgb16>& picture = display_.picture();
+  const Rgb16 code = picture.empty()
+                         ? display_.code()
+                         : picture(std::min(static_cast<int>(pixel.x()), projector.width - 1),
+                                   std::min(static_cast<int>(pixel.y()), projector.height - 1));
   const Xyz light =
-      bench_.board(display_.code(), pixel, display_.lit(), target == calibration::Target::kObject);
-  Xyz reading = light;
+      bench_.board(code, pixel, display_.lamp(), target == calibration::Target::kObject);
+  const double hours = to_seconds(display_.now().time_since_epoch()) / 3600.0;
+  Xyz reading = (1.0 + options_.drift_per_hour * hours) * (light + options_.matrix_error * light);
   for (double& value : reading) value *= 1.0 + options_.relative_noise * random_.normal();
   for (double& value : reading) value += options_.dark_noise_nits * random_.normal();
   return reading;

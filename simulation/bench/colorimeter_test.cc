@@ -48,6 +48,58 @@ TEST(VirtualColorimeter, HasTheNoiseAskedFor) {
   EXPECT_NEAR(std::sqrt(square_sum), 0.01, 5 * 0.01 / std::sqrt(2.0 * kReadings));
 }
 
+TEST(VirtualColorimeter, HasTheDriftAndTheMatrixErrorAskedFor) {
+  const auto bench = Bench::create(plain_truth(), square(0.1));
+  ASSERT_TRUE(bench);
+  VirtualPatchDisplay display(**bench);
+  InstrumentTruth truth;
+  truth.relative_noise = 0;
+  truth.dark_noise_nits = 0;
+  truth.drift_per_hour = 0.1;
+  truth.matrix_error << 0.01, -0.02, 0.003, 0.004, 0.005, -0.006, 0.007, 0.008, 0.009;
+  VirtualColorimeter colorimeter(**bench, display, options_from(truth));
+  ASSERT_TRUE(display.show({255, 100, 30}));
+  const Xyz light = (*bench)->board({255, 100, 30}, {32, 24}, 1, false);
+  const Xyz off = light + truth.matrix_error * light;
+  const Xyz at_first = *colorimeter.read(Target::kWhiteReference, {32, 24});
+  EXPECT_TRUE(at_first.isApprox(off * (1 + 0.1 / 3600), 1e-12)) << "after the reading's second";
+  display.pass(7199);
+  const Xyz at_last = *colorimeter.read(Target::kWhiteReference, {32, 24});
+  EXPECT_TRUE(at_last.isApprox(off * (1 + 0.1 * 7201 / 3600), 1e-12));
+}
+
+TEST(VirtualColorimeter, OfAPictureReadsThePixelsOwnCode) {
+  const auto bench = Bench::create(plain_truth(), square(0.1));
+  ASSERT_TRUE(bench);
+  VirtualPatchDisplay display(**bench);
+  VirtualColorimeter colorimeter(**bench, display, {0, 0, 1});
+  Image<Rgb16> picture(64, 48);
+  picture(63, 10) = {9, 8, 7};
+  ASSERT_TRUE(display.show_picture(picture.view()));
+  EXPECT_EQ(*colorimeter.read(Target::kObject, {64, 10.5}),
+            (*bench)->board({9, 8, 7}, {64, 10.5}, 1, true));
+  EXPECT_EQ(*colorimeter.read(Target::kObject, {5, 5}), (*bench)->board({}, {5, 5}, 1, true));
+}
+
+TEST(VirtualPatchDisplay, TheLampSettlesWithItsTimeConstant) {
+  BenchTruth truth = plain_truth();
+  truth.projector.lamp_drift = 0.03;
+  truth.projector.lamp_settling_s = 100;
+  const auto bench = Bench::create(truth, square(0.1));
+  ASSERT_TRUE(bench);
+  VirtualPatchDisplay display(**bench);
+  ASSERT_TRUE(display.show({255, 255, 255}));
+  EXPECT_DOUBLE_EQ(display.lamp(), 0.97);
+  VirtualColorimeter colorimeter(**bench, display, {0, 0, 1});
+  const double settled = (*bench)->board({255, 255, 255}, {32, 24}, 1, false).y();
+  for (int second = 1; second <= 400; ++second) {
+    const double y = colorimeter.read(Target::kWhiteReference, {32, 24})->y();
+    ASSERT_NEAR(y, settled * (1 - 0.03 * std::exp(-second / 100.0)), 1e-9 * settled) << second;
+  }
+  ASSERT_TRUE(display.show({255, 255, 255}, false));
+  EXPECT_EQ(display.lamp(), 0);
+}
+
 TEST(VirtualColorimeter, RefusesWhatIsNotOnTheRaster) {
   const auto bench = Bench::create(plain_truth(), square(0.1));
   ASSERT_TRUE(bench);

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <Eigen/LU>
-
 #include <cmath>
 #include <limits>
 
@@ -45,7 +43,7 @@ Result<Xyz> Bench::white(const RigidTransform& world_from_object) const {
   const auto full = static_cast<std::uint16_t>((1 << truth.bits) - 1);
   const SurfaceLight& white = state_->on_white;
   return Xyz(geometry *
-             (white.primaries * state_->projector.output({full, full, full}) + white.black));
+             (white.outputs * state_->projector.output({full, full, full}) + white.black));
 }
 
 bool Bench::reachable(const Xyz& xyz, double geometry) const {
@@ -54,17 +52,16 @@ bool Bench::reachable(const Xyz& xyz, double geometry) const {
   const SurfaceLight& surface = state_->on_object;
   const double tolerance = kRounding * xyz.cwiseAbs().maxCoeff();
   // Held against the light, not the drive: where G is small, a rounding of xyz is any drive.
-  const auto sends = [&](const Eigen::Vector3d& output) {
-    const Xyz sent = geometry * (surface.primaries * output + surface.black) + surface.ambient;
+  const auto sends = [&](const VirtualProjector::Outputs& output) {
+    const Xyz sent = geometry * (surface.outputs * output + surface.black) + surface.ambient;
     // False for NaN, which is what `output` is where dividing by a tiny G overflows.
     return ((sent - xyz).cwiseAbs().array() <= tolerance).all();
   };
-  if (sends(Eigen::Vector3d::Zero())) return true;
+  if (sends(VirtualProjector::Outputs::Zero())) return true;
   if (geometry == 0) return false;
   const Xyz from_channels = (xyz - surface.ambient) / geometry - surface.black;
   const VirtualProjector& projector = state_->projector;
-  return sends(
-      projector.interact(projector.drive_towards(surface.primaries.inverse() * from_channels)));
+  return sends(projector.interact(projector.drive_towards(surface.outputs, from_channels)));
 }
 
 Result<Comparison> Bench::compare(const EyeView& view,

@@ -31,8 +31,7 @@ struct Landmark {
 class VirtualRig {
  public:
   /// @param bench  borrowed; must outlive the rig.
-  /// Errors: kInvalidOption (a bench without camera and board, no room for the board), those of
-  /// load_mesh.
+  /// Errors: kInvalidOption (a bench without camera and board, no room for the board).
   [[nodiscard]] static Result<std::unique_ptr<VirtualRig>> create(const Bench& bench);
 
   [[nodiscard]] VirtualPatchDisplay& display() { return display_; }
@@ -65,7 +64,7 @@ class VirtualRig {
   void warm_up(double seconds) { display_.pass(seconds); }
 
  private:
-  VirtualRig(const Bench& bench, std::vector<Landmark> landmarks);
+  explicit VirtualRig(const Bench& bench);
   [[nodiscard]] Eigen::Vector3d noise(double deviation);
 
   const Bench& bench_;

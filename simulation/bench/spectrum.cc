@@ -55,6 +55,11 @@ Spectrum planckian_spectrum(double kelvin) {
   return s / planck(kNorm_nm);
 }
 
+Spectrum planckian_light(double kelvin, double nits) {
+  const Spectrum shape = planckian_spectrum(kelvin);
+  return shape * (nits / xyz_of(shape).y());
+}
+
 Spectrum interpolated_spectrum(const std::vector<double>& at_nm,
                                const std::vector<double>& values) {
   VENEER_CHECK(!at_nm.empty() && at_nm.size() == values.size());

@@ -28,6 +28,9 @@ using Spectrum = Eigen::Array<double, kBands, 1>;
 /// Planck's law relative to its value at 560 nm.   @param kelvin  > 0.
 [[nodiscard]] Spectrum planckian_spectrum(double kelvin);
 
+/// Planck's law with a luminance in cd/m^2.   @param kelvin  > 0.
+[[nodiscard]] Spectrum planckian_light(double kelvin, double nits);
+
 /// Straight lines between given points, constant beyond them.
 /// @param at_nm  at least one wavelength, strictly rising (checked).   @param values  one each.
 [[nodiscard]] Spectrum interpolated_spectrum(const std::vector<double>& at_nm,

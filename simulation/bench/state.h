@@ -9,10 +9,10 @@
 
 namespace veneer::simulation {
 
-/// XYZ of what one surface sends: per output of each channel and for black where G = 1, and for the
-/// ambient light.
+/// XYZ of what one surface sends: for output 1 of each of the projector's lights and for black
+/// where G = 1, and for the ambient light.
 struct SurfaceLight {
-  Eigen::Matrix3d primaries;
+  VirtualProjector::SurfaceOutputs outputs;
   Xyz black;
   Xyz ambient;
 };

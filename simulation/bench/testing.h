@@ -39,6 +39,29 @@ inline BenchTruth plain_truth() {
   return truth;
 }
 
+/// plain_truth() with a camera beside the projector and a board of 5 by 4 inner corners.
+inline BenchTruth truth_with_camera() {
+  BenchTruth truth = plain_truth();
+  CameraTruth camera;
+  camera.width = 320;
+  camera.height = 240;
+  camera.focal_px = 900;
+  camera.principal_point = {163, 118};
+  camera.k1 = -0.2;
+  camera.k2 = 0.1;
+  camera.world_from_camera =
+      look_at({-0.2, 0.1, 1}, Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitY());
+  truth.camera = camera;
+  BoardTruth board;
+  board.columns = 5;
+  board.rows = 4;
+  board.square_m = 0.015;
+  board.border_m = 0.005;
+  board.poses = 8;
+  truth.board = board;
+  return truth;
+}
+
 /// A square in the plane z = `z`, facing +z, u along +x and v along -y.
 inline void add_square(Mesh& mesh, double half_side, double z) {
   const auto base = static_cast<std::uint32_t>(mesh.positions.size());

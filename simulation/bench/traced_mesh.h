@@ -40,6 +40,7 @@ class TracedMesh {
   /// Whether the mesh stands between a surface point and another point.
   [[nodiscard]] bool hides(const SurfacePoint& from, const Eigen::Vector3d& to) const;
   [[nodiscard]] SurfacePoint at(const MeshPoint& point) const;
+  [[nodiscard]] const Mesh& mesh() const { return mesh_; }
 
  private:
   struct Scene;

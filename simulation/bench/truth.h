@@ -103,8 +103,8 @@ struct TrackerTruth {
   std::uint64_t seed = 1;
 };
 
-/// A colour camera of linear response, with radial distortion: a ray of slope s (x / z, y / z)
-/// falls on focal_px s (1 + k1 |s|^2 + k2 |s|^4) + principal_point.
+/// A colour camera of linear response whose lens blurs by a pixel, with radial distortion: a ray of
+/// slope s (x / z, y / z) falls on focal_px s (1 + k1 |s|^2 + k2 |s|^4) + principal_point.
 struct CameraTruth {
   int width = 1280;
   int height = 960;
@@ -120,7 +120,7 @@ struct CameraTruth {
   int bits = 12;             ///< full scale is the full well
   double least_exposure_s = 1e-4;
   double most_exposure_s = 1;
-  int samples = 3;  ///< rays along each side of a pixel
+  int samples = 3;  ///< its square is the number of rays of a pixel
   std::uint64_t seed = 1;
 };
 

@@ -7,6 +7,8 @@
 
 #include <cmath>
 #include <functional>
+#include <numbers>
+#include <vector>
 
 #include "base/files.h"
 #include "simulation/bench/testing.h"
@@ -43,6 +45,14 @@ TEST(BenchTruth, TheDemosBenchLoads) {
   EXPECT_EQ(truth->projector.channels[1].tone, ChannelTruth::Tone::kSCurve);
   EXPECT_EQ(truth->projector.channels[2].centre_nm, 459.0);
   EXPECT_EQ(truth->object.mesh, "sphere");
+  EXPECT_EQ(truth->instrument.relative_noise, 0.003);
+  ASSERT_TRUE(truth->camera && truth->board);
+  EXPECT_EQ(truth->camera->bits, 12);
+  EXPECT_EQ(truth->board->columns, 9);
+  EXPECT_NEAR(
+      truth->board->board_from_sensor.rotation.angularDistance(Eigen::Quaterniond::Identity()),
+      Eigen::Vector3d(8, -14, 75).norm() * std::numbers::pi / 180,
+      1e-12);
   // The projector looks at the origin: that lies on its +z axis.
   const Eigen::Vector3d origin =
       truth->projector.world_from_projector.inverse() * Eigen::Vector3d::Zero();
@@ -67,6 +77,24 @@ TEST(BenchTruth, MistakesInTheFileAreNamed) {
   expect_refused("0.85, 0.855]", "0.85]", "as many of each");
   expect_refused("[400, 450", "[450, 400", "does not rise");
   expect_refused("samples = 3", "samples = 0", "eye.samples");
+  expect_refused("[instrument]", "[instrumnt]", "instrument");
+  expect_refused("full_well = 10000.0", "full_wel = 10000.0", "full_well");
+  expect_refused("focal_px = 3600.0", "", "focal_px");
+  expect_refused("target = [0.0, 0.0, -0.02]", "target = [-0.30, 0.24, 1.22]", "target");
+  expect_refused("k1 = -0.12 ", "k1 = -9.0 ", "folds over");
+  expect_refused("poses = 10", "poses = 2", "board.poses");
+}
+
+TEST(BenchTruth, ACameraWithoutABoardIsRefused) {
+  BenchTruth truth = testing::plain_truth();
+  truth.camera = CameraTruth{};
+  const Status status = truth.check();
+  ASSERT_FALSE(status);
+  EXPECT_THAT(status.error().what, HasSubstr("go together"));
+  truth.board = BoardTruth{};
+  EXPECT_TRUE(truth.check());
+  truth.camera.reset();
+  EXPECT_FALSE(truth.check());
 }
 
 TEST(BenchTruth, AMissingFileIsNotFound) {
@@ -91,6 +119,35 @@ TEST(BenchTruth, EveryRangeIsChecked) {
       [](BenchTruth& t) { t.projector.leak = 0.4; },
       [](BenchTruth& t) { t.projector.interaction = -0.1; },
       [](BenchTruth& t) { t.projector.reference_distance_m = 0; },
+      [](BenchTruth& t) { t.projector.chromaticity_drift = 0.31; },
+      [](BenchTruth& t) { t.projector.white_segment = std::nan(""); },
+      [](BenchTruth& t) { t.projector.white_segment_exponent = 0.5; },
+      [](BenchTruth& t) { t.projector.white_segment_kelvin = 0; },
+      [](BenchTruth& t) { t.projector.lamp_drift = -0.1; },
+      [](BenchTruth& t) { t.projector.lamp_settling_s = 0; },
+      [](BenchTruth& t) { t.instrument.relative_noise = -1; },
+      [](BenchTruth& t) { t.instrument.dark_noise_nits = std::nan(""); },
+      [](BenchTruth& t) { t.instrument.drift_per_hour = 1; },
+      [](BenchTruth& t) { t.instrument.matrix_error(1, 2) = std::nan(""); },
+      [](BenchTruth& t) { t.tracker.position_noise_m = -1; },
+      [](BenchTruth& t) { t.tracker.rotation_noise_deg = 11; },
+      [](BenchTruth& t) { t.camera->width = 0; },
+      [](BenchTruth& t) { t.camera->focal_px = 0; },
+      [](BenchTruth& t) { t.camera->principal_point.x() = -1; },
+      [](BenchTruth& t) { t.camera->k1 = -9; },
+      [](BenchTruth& t) { t.camera->k2 = std::nan(""); },
+      [](BenchTruth& t) { t.camera->sensitivity = 0; },
+      [](BenchTruth& t) { t.camera->full_well = 0; },
+      [](BenchTruth& t) { t.camera->read_noise = -1; },
+      [](BenchTruth& t) { t.camera->bits = 17; },
+      [](BenchTruth& t) { t.camera->most_exposure_s = 1e-5; },
+      [](BenchTruth& t) { t.camera->samples = 0; },
+      [](BenchTruth& t) { t.board->columns = 1; },
+      [](BenchTruth& t) { t.board->square_m = 0; },
+      [](BenchTruth& t) { t.board->border_m = -1; },
+      [](BenchTruth& t) { t.board->black = 0.9; },
+      [](BenchTruth& t) { t.board->poses = 2; },
+      [](BenchTruth& t) { t.board->tilt_deg = 61; },
       [](BenchTruth& t) { t.projector.black_fraction = std::nan(""); },
       [](BenchTruth& t) { t.projector.vignetting_drop = 1; },
       [](BenchTruth& t) { t.projector.vignetting_off_centre.x() = 1; },
@@ -105,6 +162,9 @@ TEST(BenchTruth, EveryRangeIsChecked) {
   EXPECT_TRUE(testing::plain_truth().check());
   for (std::size_t i = 0; i < mistakes.size(); ++i) {
     BenchTruth truth = testing::plain_truth();
+    truth.camera = CameraTruth{};
+    truth.board = BoardTruth{};
+    EXPECT_TRUE(truth.check());
     mistakes[i](truth);
     EXPECT_FALSE(truth.check()) << "mistake " << i;
   }
