@@ -46,6 +46,7 @@ calibration::ProjectorProfile bench_profile(int width, int height) {
   profile.geometry.cx = 0.5 * width;
   profile.geometry.cy = 0.5 * height;
   profile.reference_distance_m = 0.5;
+  profile.vignetting = Image<float>(1, 1, 1.0F);
   profile.primaries = 300.0 * xyz_from_srgb();
   for (auto& curve : profile.tone_curves) {
     for (int code = 0; code < 256; ++code) curve.push_back(std::pow(code / 255.0, 2.2));
@@ -111,6 +112,7 @@ btf::ModelShader plain_textures() {
 struct Entrant {
   RenderTiming timing;
   std::optional<DrawPass> pass;
+  std::optional<CompensatePass> compensate;
   std::vector<double> query_ms;
   std::vector<double> finish_ms;
 };
@@ -119,9 +121,7 @@ class Bench {
  public:
   static Result<Bench> create(EglContext context, const RenderBenchOptions& options) {
     const calibration::ProjectorProfile profile = bench_profile(options.width, options.height);
-    const Compensation compensation(profile, {});
-    VENEER_ASSIGN(CompensatePass compensate, CompensatePass::create(compensation, profile));
-    Bench bench(std::move(context), profile, std::move(compensate), options.texels_per_pixel);
+    Bench bench(std::move(context), profile, options.texels_per_pixel);
     const btf::ModelShader plain = plain_textures();
     VENEER_TRY(bench.add(
         "plain",
@@ -136,7 +136,11 @@ class Bench {
       VENEER_TRY(
           bench.add(name, shader, DrawPass::create(shader, {kLight}, repeats, profile, draw)));
     }
-    bench.entrants_.emplace_back().timing.name = "compensation";
+    VENEER_TRY(bench.add_compensation("compensation", profile));
+    calibration::ProjectorProfile with_segment = profile;
+    with_segment.residual = calibration::ColourResidual::sampled(
+        17, [](const Vector3d& t) -> Vector3d { return 0.25 * t.minCoeff() * Vector3d::Ones(); });
+    VENEER_TRY(bench.add_compensation("compensation with residual", with_segment));
     return bench;
   }
 
@@ -153,10 +157,7 @@ class Bench {
   }
 
  private:
-  Bench(EglContext context,
-        calibration::ProjectorProfile profile,
-        CompensatePass compensate,
-        double texels_per_pixel)
+  Bench(EglContext context, calibration::ProjectorProfile profile, double texels_per_pixel)
       : context_(std::move(context)),
         texels_per_pixel_(texels_per_pixel),
         profile_(std::move(profile)),
@@ -165,8 +166,7 @@ class Bench {
         depth_(make_texture_2d(
             GL_DEPTH_COMPONENT32F, profile_.geometry.width, profile_.geometry.height)),
         framebuffer_(make_framebuffer()),
-        query_(make_query(GL_TIME_ELAPSED)),
-        compensate_(std::move(compensate)) {
+        query_(make_query(GL_TIME_ELAPSED)) {
     glNamedFramebufferTexture(framebuffer_.id(), GL_COLOR_ATTACHMENT0, target_.id(), 0);
     glNamedFramebufferTexture(framebuffer_.id(), GL_DEPTH_ATTACHMENT, depth_.id(), 0);
   }
@@ -191,6 +191,15 @@ class Bench {
     }
     if (const SurfaceBuffer* surface = entrant.pass->surface())
       entrant.timing.gpu_bytes += surface->gpu_bytes();
+    return {};
+  }
+
+  Status add_compensation(const std::string& name, const calibration::ProjectorProfile& profile) {
+    VENEER_ASSIGN(const PreparedProfile prepared, PreparedProfile::prepare(profile, {}));
+    VENEER_ASSIGN(CompensatePass compensate, CompensatePass::create(prepared));
+    Entrant& entrant = entrants_.emplace_back();
+    entrant.timing.name = name;
+    entrant.compensate.emplace(std::move(compensate));
     return {};
   }
 
@@ -220,7 +229,8 @@ class Bench {
                                  kComparedPixels,
                                  rays));
       const std::vector<Vector3d> reference = reference_at(set, queries);
-      for (std::size_t e = 1; e + 1 < entrants_.size(); ++e) {
+      for (std::size_t e = 1; e < entrants_.size(); ++e) {
+        if (!entrants_[e].pass) continue;
         entrants_[e].pass->draw(framebuffer_.id(), mesh_, input);
         glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.id());
         glPixelStorei(GL_PACK_ALIGNMENT, 4);
@@ -237,7 +247,8 @@ class Bench {
       progress.advance();
     }
     progress.finish();
-    for (std::size_t e = 1; e + 1 < entrants_.size(); ++e) {
+    for (std::size_t e = 1; e < entrants_.size(); ++e) {
+      if (!entrants_[e].pass) continue;
       entrants_[e].timing.screen_epsilon = errors[e].epsilon();
       entrants_[e].timing.screen_rmse = errors[e].rmse();
     }
@@ -252,7 +263,7 @@ class Bench {
     if (entrant.pass) {
       entrant.pass->draw(framebuffer_.id(), mesh_, input);
     } else {
-      compensate_.run(target_.id(), static_cast<std::uint32_t>(frame));
+      entrant.compensate->run(target_.id(), static_cast<std::uint32_t>(frame));
     }
     glEndQuery(GL_TIME_ELAPSED);
     glFinish();
@@ -302,7 +313,6 @@ class Bench {
   GlTexture depth_;
   GlFramebuffer framebuffer_;
   GlQuery query_;
-  CompensatePass compensate_;
   std::vector<Entrant> entrants_;
 };
 

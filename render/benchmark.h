@@ -60,17 +60,18 @@ struct RenderTiming {
 struct RenderBenchResult {
   std::string renderer;  ///< GL renderer and version
   std::string clock;     ///< what measured: "GL timer query" or "steady clock around glFinish"
-  std::vector<RenderTiming>
-      timings;  ///< "plain" first, then the materials in order, then "compensation"
+  std::vector<RenderTiming> timings;  ///< "plain" first, then the materials in order, then
+                                      ///< "compensation" and "compensation with residual"
 };
 
 /// Times drawing a curved mesh that covers the whole frame, texels_per_pixel texels along a
 /// pixel's side, one directional light, into half floats with depth. "plain" is the yardstick: the
 /// same mesh, interpolants and target, one filtered fetch times the light's cosine. All draws take
 /// turns within every frame, so that a change in the machine's load hits all alike. "compensation"
-/// is the full-screen pass that follows a draw in the renderer (with its counters); no material's
-/// figure contains it. The GL timer query is used where it is plausible, else glFinish and the
-/// clock. Errors: kInvalidOption, kUnavailable (no GL 4.5).
+/// is the full-screen pass that follows a draw in the renderer (with its counters), once for a
+/// profile without and once for one with a colour residual; no material's figure contains it. The
+/// GL timer query is used where it is plausible, else glFinish and the clock. Errors:
+/// kInvalidOption, kUnavailable (no GL 4.5).
 [[nodiscard]] Result<RenderBenchResult> bench_render(const RenderBenchOptions& options,
                                                      Progress& progress);
 

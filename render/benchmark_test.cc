@@ -28,11 +28,12 @@ TEST(RenderBench, TimesEveryMaterialAgainstPlain) {
   const auto result = bench_render(options, progress);
   if (!result && result.error().code == Errc::kUnavailable) GTEST_SKIP() << result.error().what;
   ASSERT_TRUE(result) << result.error().what;
-  ASSERT_EQ(result->timings.size(), 3U);
+  ASSERT_EQ(result->timings.size(), 4U);
   EXPECT_EQ(result->timings[0].name, "plain");
   EXPECT_EQ(result->timings[0].ratio, 1.0);
   EXPECT_EQ(result->timings[0].fetches, 1);
   EXPECT_EQ(result->timings[2].name, "compensation");
+  EXPECT_EQ(result->timings[3].name, "compensation with residual");
   EXPECT_GT(result->timings[1].ratio, 2.0);
   for (const RenderTiming& timing : result->timings) {
     EXPECT_GT(timing.ms_median, 0.0);

@@ -2,6 +2,7 @@
 #include "render/compensate_pass.h"
 
 #include <array>
+#include <utility>
 #include <vector>
 
 namespace veneer::render {
@@ -39,8 +40,10 @@ struct ConstantsBlock {
   float gamut_tolerance;
   float dither;
   std::int32_t gamut_steps;
+  Eigen::Vector4f correction_full;
+  Eigen::Vector4i correction_axes;
 };
-static_assert(sizeof(ConstantsBlock) == 4 * 64 + 6 * 16);
+static_assert(sizeof(ConstantsBlock) == 4 * 64 + 8 * 16);
 
 Eigen::Matrix4f padded(const Eigen::Matrix3d& m) {
   Eigen::Matrix4f result = Eigen::Matrix4f::Identity();
@@ -73,6 +76,10 @@ ConstantsBlock block_of(const Compensation& compensation) {
   block.gamut_tolerance = static_cast<float>(kGamutTolerance);
   block.dither = c.dither ? 1.0F : 0.0F;
   block.gamut_steps = kGamutSteps;
+  const calibration::DriveCorrection& correction = compensation.correction();
+  const calibration::DriveCorrection::Axes& axes = correction.axes();
+  block.correction_full = padded(axes.full);
+  block.correction_axes = {axes.steps, axes.below, correction.nodes() - 1, 0};
   return block;
 }
 
@@ -108,9 +115,29 @@ GlTexture upload_levels(const Compensation& compensation) {
   return texture;
 }
 
+// The correction of every node; alpha is padding.
+GlTexture upload_correction(const calibration::DriveCorrection& correction) {
+  if (correction.empty()) return {};
+  std::vector<Eigen::Vector4f> texels;
+  texels.reserve(correction.values().size());
+  for (const Eigen::Vector3d& value : correction.values()) texels.push_back(padded(value));
+  const int n = correction.nodes();
+  GlTexture texture = make_texture(GL_TEXTURE_3D);
+  glTextureStorage3D(texture.id(), 1, GL_RGBA32F, n, n, n);
+  glTextureParameteri(texture.id(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  glTextureParameteri(texture.id(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  glTextureSubImage3D(texture.id(), 0, 0, 0, 0, n, n, n, GL_RGBA, GL_FLOAT, texels.data()->data());
+  return texture;
+}
+
+CompensateKind kind_of(const Compensation& compensation) {
+  if (!compensation.constants().compensate) return CompensateKind::kNone;
+  return compensation.correction().empty() ? CompensateKind::kPlain : CompensateKind::kResidual;
+}
+
 // A picture of floats, without padding.
 template <class Pixel>
-GlTexture upload(GLenum internal_format, GLenum format, const Image<Pixel>& image) {
+GlTexture upload_image(GLenum internal_format, GLenum format, const Image<Pixel>& image) {
   GlTexture texture = make_texture_2d(internal_format, image.width(), image.height());
   glTextureSubImage2D(texture.id(),
                       0,
@@ -128,43 +155,85 @@ GLsizei groups(int pixels, int per_group) { return (pixels + per_group - 1) / pe
 
 }  // namespace
 
-std::string compensate_fragment_source(bool compensate) {
-  return fmt::format("{}#define SEED_COUNT {}\n#define LEVELS_WIDTH {}\n{}{}",
+std::string compensate_fragment_source(CompensateKind kind) {
+  return fmt::format("{}#define SEED_COUNT {}\n#define LEVELS_WIDTH {}\n{}{}{}",
                      kVersion,
                      ToneLevels::kSeeds,
                      kLevelsWidth,
-                     compensate ? "#define COMPENSATE\n" : "",
+                     kind != CompensateKind::kNone ? "#define COMPENSATE\n" : "",
+                     kind == CompensateKind::kResidual ? "#define RESIDUAL\n" : "",
                      kCompensateFrag);
 }
 std::string fullscreen_vertex_source() { return std::string(kVersion) + kFullscreenVert; }
 std::string count_compute_source() { return std::string(kVersion) + kCountComp; }
 
-Result<CompensatePass> CompensatePass::create(const Compensation& compensation,
-                                              const calibration::ProjectorProfile& profile) {
+Status CompensatePass::link(CompensateKind kind) {
+  Program& program = programs_[static_cast<std::size_t>(kind)];
+  if (program.program.id() != 0) return {};
+  VENEER_ASSIGN(
+      program.program,
+      link_program({{GL_VERTEX_SHADER, "fullscreen.vert", fullscreen_vertex_source()},
+                    {GL_FRAGMENT_SHADER, "compensate.frag", compensate_fragment_source(kind)}}));
+  program.seed_location = glGetUniformLocation(program.program.id(), "dither_seed");
+  return {};
+}
+
+// Drivers finish compiling when a program first draws: one pixel, which the next run overwrites.
+// The kind is not the current one, so that a residual's texture is not there yet.
+Status CompensatePass::warm_up(CompensateKind kind) {
+  VENEER_TRY(link(kind));
+  const CompensateKind current = std::exchange(kind_, kind);
+  if (kind == CompensateKind::kResidual) {
+    const auto nothing = [](const Eigen::Vector3d&) { return Eigen::Vector3d(0, 0, 0); };
+    profile_.correction = upload_correction(
+        calibration::DriveCorrection(calibration::ColourResidual::sampled(2, nothing), 5));
+  }
+  const GlTexture target = make_texture_2d(GL_RGBA16F, 1, 1);
+  compensate(target.id(), 0, 1, 1);
+  glFinish();
+  if (kind == CompensateKind::kResidual) profile_.correction = {};
+  kind_ = current;
+  return {};
+}
+
+CompensatePass::ProfileTextures CompensatePass::upload(const PreparedProfile& profile) {
+  const Compensation& compensation = profile.compensation();
+  const ConstantsBlock block = block_of(compensation);
+  return {make_buffer(&block, sizeof(block), 0),
+          upload_seeds(compensation),
+          upload_levels(compensation),
+          upload_image(GL_R32F, GL_RED, profile.vignetting()),
+          upload_image(GL_RGB32F, GL_RGB, profile.reflectance()),
+          upload_correction(compensation.correction())};
+}
+
+Status CompensatePass::set_profile(const PreparedProfile& profile) {
+  VENEER_CHECK(profile.vignetting().width() == width_ && profile.vignetting().height() == height_);
+  const CompensateKind kind = kind_of(profile.compensation());
+  VENEER_CHECK((kind == CompensateKind::kNone) == (kind_ == CompensateKind::kNone));
+  VENEER_TRY(link(kind));
+  profile_ = upload(profile);
+  kind_ = kind;
+  return {};
+}
+
+Result<CompensatePass> CompensatePass::create(const PreparedProfile& profile, bool exchangeable) {
   CompensatePass pass;
-  pass.width_ = profile.geometry.width;
-  pass.height_ = profile.geometry.height;
-  VENEER_ASSIGN(pass.program_,
-                link_program({{GL_VERTEX_SHADER, "fullscreen.vert", fullscreen_vertex_source()},
-                              {GL_FRAGMENT_SHADER,
-                               "compensate.frag",
-                               compensate_fragment_source(compensation.constants().compensate)}}));
+  pass.width_ = profile.vignetting().width();
+  pass.height_ = profile.vignetting().height();
+  pass.kind_ = kind_of(profile.compensation());
+  VENEER_TRY(pass.link(pass.kind_));
   VENEER_ASSIGN(pass.count_program_,
                 link_program({{GL_COMPUTE_SHADER, "count.comp", count_compute_source()}}));
-  pass.seed_location_ = glGetUniformLocation(pass.program_.id(), "dither_seed");
-
-  const ConstantsBlock block = block_of(compensation);
-  pass.constants_ = make_buffer(&block, sizeof(block), 0);
-  pass.seeds_ = upload_seeds(compensation);
-  pass.levels_ = upload_levels(compensation);
-  const Image<float> vignetting = vignetting_raster(profile);
-  pass.vignetting_ = upload(GL_R32F, GL_RED, vignetting);
-  const Image<Rgb32f> reflectance = reflectance_raster(profile);
-  pass.reflectance_ = upload(GL_RGB32F, GL_RGB, reflectance);
+  pass.profile_ = upload(profile);
   pass.codes_ = make_texture_2d(GL_RGBA16UI, pass.width_, pass.height_);
   pass.framebuffer_ = make_framebuffer();
   glNamedFramebufferTexture(pass.framebuffer_.id(), GL_COLOR_ATTACHMENT0, pass.codes_.id(), 0);
   pass.no_vertices_ = make_vertex_array();
+  if (exchangeable && pass.kind_ != CompensateKind::kNone) {
+    for (const CompensateKind kind : {CompensateKind::kPlain, CompensateKind::kResidual})
+      if (kind != pass.kind_) VENEER_TRY(pass.warm_up(kind));
+  }
 
   GLint alignment = 1;
   glGetIntegerv(GL_SHADER_STORAGE_BUFFER_OFFSET_ALIGNMENT, &alignment);
@@ -187,25 +256,31 @@ Result<CompensatePass> CompensatePass::create(const Compensation& compensation,
 
 CompensatePass::~CompensatePass() {
   // Moved-from passes have no program, and their fences went along.
-  if (program_.id() == 0) return;
+  if (count_program_.id() == 0) return;
   for (const InFlight& slot : ring_) glDeleteSync(slot.fence);  // null is ignored
 }
 
-void CompensatePass::run(GLuint target, std::uint32_t dither_seed) {
+void CompensatePass::compensate(GLuint target, std::uint32_t dither_seed, int width, int height) {
+  const Program& program = programs_[static_cast<std::size_t>(kind_)];
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
-  glViewport(0, 0, width_, height_);
+  glViewport(0, 0, width, height);
   glDisable(GL_DEPTH_TEST);
   glDisable(GL_BLEND);
-  glUseProgram(program_.id());
-  glProgramUniform1ui(program_.id(), seed_location_, dither_seed);
-  glBindBufferBase(GL_UNIFORM_BUFFER, 1, constants_.id());
+  glUseProgram(program.program.id());
+  glProgramUniform1ui(program.program.id(), program.seed_location, dither_seed);
+  glBindBufferBase(GL_UNIFORM_BUFFER, 1, profile_.constants.id());
   glBindTextureUnit(0, target);
-  glBindTextureUnit(1, vignetting_.id());
-  glBindTextureUnit(2, seeds_.id());
-  glBindTextureUnit(3, levels_.id());
-  glBindTextureUnit(4, reflectance_.id());
+  glBindTextureUnit(1, profile_.vignetting.id());
+  glBindTextureUnit(2, profile_.seeds.id());
+  glBindTextureUnit(3, profile_.levels.id());
+  glBindTextureUnit(4, profile_.reflectance.id());
+  if (kind_ == CompensateKind::kResidual) glBindTextureUnit(5, profile_.correction.id());
   glBindVertexArray(no_vertices_.id());
   glDrawArrays(GL_TRIANGLES, 0, 3);
+}
+
+void CompensatePass::run(GLuint target, std::uint32_t dither_seed) {
+  compensate(target, dither_seed, width_, height_);
 
   const std::size_t index = frame_ % kRing;
   InFlight& slot = ring_[index];

@@ -10,11 +10,18 @@
 #include "base/image.h"
 #include "render/compensation.h"
 #include "render/gl_objects.h"
+#include "render/prepared_profile.h"
 
 namespace veneer::render {
 
-/// The complete source of the compensate pass; `compensate` as in RendererOptions.
-[[nodiscard]] std::string compensate_fragment_source(bool compensate);
+/// What the compensate pass does; a program each.
+enum class CompensateKind {
+  kNone,      ///< without RendererOptions::compensate
+  kPlain,     ///< tone curves and one matrix
+  kResidual,  ///< with the profile's colour residual
+};
+/// The complete source of the compensate pass.
+[[nodiscard]] std::string compensate_fragment_source(CompensateKind kind);
 /// The complete sources of the pass's other stages.
 [[nodiscard]] std::string fullscreen_vertex_source();
 [[nodiscard]] std::string count_compute_source();
@@ -31,14 +38,18 @@ class CompensatePass {
     double gamut_loss = 0;  ///< sum over the pixels
   };
 
-  /// @param profile  the one that `compensation` was made of.
+  /// @param exchangeable  compiles at once what any other profile may need, so that set_profile()
+  ///                      leaves no work to the frame after it.
   /// Errors: kUnavailable (the driver refuses a shader).
-  [[nodiscard]] static Result<CompensatePass> create(const Compensation& compensation,
-                                                     const calibration::ProjectorProfile& profile);
+  [[nodiscard]] static Result<CompensatePass> create(const PreparedProfile& profile,
+                                                     bool exchangeable = false);
   CompensatePass(CompensatePass&&) noexcept = default;
   CompensatePass& operator=(CompensatePass&&) = delete;
   ~CompensatePass();
 
+  /// From the next run on, another profile of the same raster (checked), prepared with the same
+  /// options. Errors: kUnavailable (the driver refuses a shader); the old one stays.
+  [[nodiscard]] Status set_profile(const PreparedProfile& profile);
   /// @param target  RGBA16F or RGBA32F texture of the raster's size.
   void run(GLuint target, std::uint32_t dither_seed);
   /// The framebuffer whose colour attachment (RGBA16UI) holds the codes of the last run.
@@ -54,20 +65,34 @@ class CompensatePass {
     std::uint64_t number = 0;
   };
   static constexpr std::size_t kRing = 4;
+  // What a kind of compensation is drawn by; linked when it is first needed.
+  struct Program {
+    GlProgram program;
+    GLint seed_location = -1;
+  };
+  // What is made of one profile.
+  struct ProfileTextures {
+    GlBuffer constants;
+    GlTexture seeds;
+    GlTexture levels;
+    GlTexture vignetting;
+    GlTexture reflectance;
+    GlTexture correction;  // none without a residual
+  };
   CompensatePass() = default;
+  [[nodiscard]] Status link(CompensateKind kind);
+  [[nodiscard]] Status warm_up(CompensateKind kind);
+  static ProfileTextures upload(const PreparedProfile& profile);
+  void compensate(GLuint target, std::uint32_t dither_seed, int width, int height);
 
-  GlProgram program_;
+  std::array<Program, 3> programs_;  // indexed by CompensateKind
+  CompensateKind kind_ = CompensateKind::kPlain;
+  ProfileTextures profile_;
   GlProgram count_program_;
-  GlBuffer constants_;
-  GlTexture seeds_;
-  GlTexture levels_;
   GlBuffer counters_;  // kRing slots, mapped for good
-  GlTexture vignetting_;
-  GlTexture reflectance_;
   GlTexture codes_;
   GlFramebuffer framebuffer_;
   GlVertexArray no_vertices_;
-  GLint seed_location_ = -1;
   GLintptr slot_bytes_ = 0;
   int width_ = 0;
   int height_ = 0;

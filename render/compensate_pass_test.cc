@@ -40,7 +40,8 @@ std::vector<Vector4f> targets(const calibration::ProjectorProfile& profile) {
     const Vector3d s = profile.reflectance_at({i % kWidth + 0.5, i / kWidth + 0.5});
     const Matrix3d surface =
         profile.surface * profile.primaries * s.asDiagonal() * profile.primaries.inverse();
-    const Vector3d xyz = surface * (g * (profile.primaries * t + profile.black) + profile.ambient);
+    const Vector3d sent = profile.primaries * (t + profile.residual(t)) + profile.black;
+    const Vector3d xyz = surface * (g * sent + profile.ambient);
     Vector4f texel;
     texel << xyz.cast<float>(), static_cast<float>(g);
     if (i % 17 == 0) texel[static_cast<int>(random.next() % 4)] = kOdd[random.next() % 8];
@@ -63,16 +64,30 @@ constexpr double kMappedTolerance = 2e-3;
 constexpr double kLossTolerance = 0.1;
 
 TEST_P(CompensatePassTest, AgreesWithTheCpu) {
-  for (const auto& [bits, patterned] :
-       {std::pair(8, false), std::pair(10, false), std::pair(8, true), std::pair(10, true)}) {
+  struct Case {
+    int bits;
+    bool patterned;
+    bool residual;
+  };
+  for (const auto& [bits, patterned, with_residual] : {Case{8, false, false},
+                                                       Case{10, false, false},
+                                                       Case{8, true, false},
+                                                       Case{10, true, false},
+                                                       Case{8, false, true},
+                                                       Case{10, true, true}}) {
+    SCOPED_TRACE(
+        fmt::format("{} bits, patterned: {}, residual: {}", bits, patterned, with_residual));
     auto profile = example_profile(kWidth, kHeight, bits);
     if (patterned) profile.surface_map = example_surface_map();
+    if (with_residual) profile.residual = example_residual();
     auto context = EglContext::create();
     if (!context) GTEST_SKIP() << context.error().what;
-    const Compensation cpu(profile, GetParam());
-    const Image<float> vignetting = vignetting_raster(profile);
-    const Image<Rgb32f> reflectance = reflectance_raster(profile);
-    auto pass = CompensatePass::create(cpu, profile);
+    const auto prepared = PreparedProfile::prepare(profile, GetParam());
+    ASSERT_TRUE(prepared) << prepared.error().what;
+    const Compensation& cpu = prepared->compensation();
+    const Image<float>& vignetting = prepared->vignetting();
+    const Image<Rgb32f>& reflectance = prepared->reflectance();
+    auto pass = CompensatePass::create(*prepared);
     ASSERT_TRUE(pass) << pass.error().what;
 
     const std::vector<Vector4f> all = targets(profile);
@@ -148,7 +163,7 @@ TEST(CompensatePass, NeverWaitsForCounts) {
   auto context = EglContext::create();
   if (!context) GTEST_SKIP() << context.error().what;
   const auto profile = example_profile(kWidth, kHeight, 8);
-  auto pass = CompensatePass::create(Compensation(profile, {}), profile);
+  auto pass = CompensatePass::create(PreparedProfile::prepare(profile, {}).value());
   ASSERT_TRUE(pass) << pass.error().what;
   EXPECT_EQ(pass->counts().covered, 0U);
   const GlTexture texture = make_texture_2d(GL_RGBA32F, kWidth, kHeight);

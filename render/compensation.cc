@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/ipt.h"
 #include "render/dither.h"
@@ -37,7 +38,7 @@ Compensation::Constants constants_of(const calibration::ProjectorProfile& profil
   Compensation::Constants c;
   c.compensate = options.compensate;
   c.dither = options.dither;
-  const Xyz full = profile.primaries * Vector3d::Ones();
+  const Xyz full = profile.emitted(Vector3d::Ones());
   if (options.compensate) {
     c.geometry_floor = options.geometry_floor;
     const Matrix3d inverse_primaries = profile.primaries.inverse();
@@ -68,10 +69,14 @@ bool is_inside(const Vector3d& drive, double tolerance) {
 Compensation::Compensation(const calibration::ProjectorProfile& profile,
                            const RendererOptions& options)
     : constants_(constants_of(profile, options)),
+      correction_(options.compensate ? calibration::DriveCorrection(profile.residual)
+                                     : calibration::DriveCorrection()),
       tone_levels_(levels_of(profile, options.compensate)) {}
 
-// pixel.drive holds t as solved, outside [0, 1]; leaves it inside, with the loss.
+// pixel.drive holds t as solved for `wanted_drive`, outside [0, 1]; leaves it inside, with the
+// loss.
 void Compensation::map_to_gamut(const Xyz& target,
+                                const Vector3d& wanted_drive,
                                 double g,
                                 const Vector3d& reflectance,
                                 CompensatedPixel& pixel) const {
@@ -79,28 +84,48 @@ void Compensation::map_to_gamut(const Xyz& target,
   const Vector3d gain = g * reflectance;
   const Vector3d offset = c.drive_of_ambient / g + c.drive_of_black;
   const auto drive_of = [&](const Vector3d& cones) -> Vector3d {
-    return (c.drive_from_cones * cones).cwiseQuotient(gain) - offset;
+    return correction_((c.drive_from_cones * cones).cwiseQuotient(gain) - offset);
   };
   const Ipt wanted = ipt_from_cones(c.cones_from_target * target);
 
-  // The neutral s W needs the drive s a - offset: reachable for s in [darkest, brightest].
+  // The neutral s W needs the drive s a - offset: reachable for s in [darkest, brightest], but for
+  // the correction.
+  const Vector3d full = correction_.axes().full;
   double darkest = 0.0;
   double brightest = HUGE_VAL;
   for (int i = 0; i < 3; ++i) {
     const double a = c.drive_of_white[i] / gain[i];
     const double at_zero = offset[i] / a;
-    const double at_one = (1.0 + offset[i]) / a;
+    const double at_one = (full[i] + offset[i]) / a;
     darkest = std::max(darkest, std::min(at_zero, at_one));
     brightest = std::min(brightest, std::max(at_zero, at_one));
   }
-  if (!(darkest <= brightest)) {
-    pixel.drive = pixel.drive.cwiseMax(0.0).cwiseMin(1.0);
-    const Vector3d shown = c.cones_from_drive * (pixel.drive + offset).cwiseProduct(gain);
+  bool any_neutral = darkest <= brightest;
+  double low = std::pow(darkest, kIptExponent);
+  double high = std::pow(brightest, kIptExponent);
+  if (!correction_.empty() && any_neutral) {
+    // A neutral gets brighter with every channel: the darkest is the first whose least channel is
+    // not below 0, the brightest the last whose largest is not above 1.
+    const auto neutral = [&](double lightness) {
+      return drive_of(cones_from_ipt({lightness, 0.0, 0.0}));
+    };
+    double step = 0.5 * (high - low);
+    std::swap(low, high);
+    for (int i = 0; i < kGamutSteps; ++i, step *= 0.5) {
+      if (neutral(low - step).minCoeff() >= 0.0) low -= step;
+      if (neutral(high + step).maxCoeff() <= 1.0) high += step;
+    }
+    any_neutral = low <= high;
+  }
+  if (!any_neutral) {
+    const Vector3d clamped = pixel.drive.cwiseMax(0.0).cwiseMin(1.0);
+    const Vector3d shown_drive =
+        correction_.empty() ? clamped : wanted_drive + (clamped - pixel.drive);
+    const Vector3d shown = c.cones_from_drive * (shown_drive + offset).cwiseProduct(gain);
+    pixel.drive = clamped;
     pixel.gamut_loss = 100.0 * (wanted - ipt_from_cones(shown)).norm();
     return;
   }
-  const double low = std::pow(darkest, kIptExponent);
-  const double high = std::pow(brightest, kIptExponent);
   const double quarter = 0.25 * (high - low);
   const Ipt anchor(std::clamp(wanted.x(), low + quarter, high - quarter), 0.0, 0.0);
   const Ipt way = wanted - anchor;
@@ -129,12 +154,13 @@ CompensatedPixel Compensation::pixel(const Xyz& target,
   }
   result.state = PixelState::kInGamut;
   const Vector3d s = constants_.compensate ? reflectance : Vector3d::Ones();
-  result.drive =
+  const Vector3d wanted_drive =
       ((constants_.drive_from_target * target).cwiseQuotient(s) - constants_.drive_of_ambient) / g -
       constants_.drive_of_black;
+  result.drive = correction_(wanted_drive);
   if (!is_inside(result.drive, kGamutTolerance)) {
     result.state = PixelState::kOutOfGamut;
-    if (constants_.compensate) map_to_gamut(target, g, s, result);
+    if (constants_.compensate) map_to_gamut(target, wanted_drive, g, s, result);
   }
   result.drive = result.drive.cwiseMax(0.0).cwiseMin(1.0);
   for (std::uint32_t i = 0; i < 3; ++i) {

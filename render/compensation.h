@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "base/colour.h"
+#include "calibration/drive_correction.h"
 #include "calibration/profile.h"
 #include "render/renderer.h"
 #include "render/tone_levels.h"
@@ -23,7 +24,7 @@ enum class PixelState : std::uint8_t {
 
 struct CompensatedPixel {
   PixelState state = PixelState::kNotCovered;
-  Eigen::Vector3d drive = Eigen::Vector3d::Zero();  ///< t, linear, in [0, 1]
+  Eigen::Vector3d drive = Eigen::Vector3d::Zero();  ///< t (tau), linear, in [0, 1]
   double gamut_loss = 0;                            ///< dE in IPT x 100 that gamut mapping made
   std::array<std::uint16_t, 3> codes{};
 };
@@ -37,18 +38,21 @@ inline constexpr int kGamutSteps = 12;
 
 /// Compensation in double precision: what shaders/compensate.frag does, pixel by pixel.
 ///
-/// With the model of ProjectorProfile, t = (M^-1 A^-1 L / s - M^-1 E) / G - M^-1 k, where s divides
-/// each primary's component by the surface's reflectance for it at this pixel. Where a component
-/// of t is outside [0, 1] (over white, over a primary, under black and ambient), the target is
-/// moved in IPT, relative to the white M 1 + k, on a straight line to a point of the achromatic
-/// axis, as little as brings it into reach: hue is kept exactly. That point's lightness is the
-/// target's, kept within the middle half of the neutrals that this pixel can show, so that a bright
-/// colour loses some lightness and some chroma instead of turning white. Where no neutral can be
-/// shown at all (a strongly coloured surface in strong ambient light) t is clamped and hue is lost.
-/// The codes bracket t in linear light; dither picks one of the two (dither.h), or the nearer one
-/// without dither.
+/// With the model of ProjectorProfile, t* = (M^-1 A^-1 L / s - M^-1 E) / G - M^-1 k, where s
+/// divides each primary's component by the surface's reflectance for it at this pixel. t is t*, or
+/// where the profile has a colour residual, DriveCorrection's tau for it. Where a component of t is
+/// outside [0, 1] (over white, over a primary, under black and ambient), the target is moved in
+/// IPT, relative to the profile's white, on a straight line to a point of the achromatic axis, as
+/// little as brings it into reach: hue is kept exactly. That point's lightness is the target's,
+/// kept within the middle half of the neutrals that this pixel can show, so that a bright colour
+/// loses some lightness and some chroma instead of turning white. Where no neutral can be shown at
+/// all (a strongly coloured surface in strong ambient light) t is clamped and hue is lost. With a
+/// residual, the ends of the neutrals are searched for as the chroma is, and the loss of a clamped
+/// t is counted with the residual of the unclamped one. The codes bracket t in linear light; dither
+/// picks one of the two (dither.h), or the nearer one without dither.
 ///
-/// Without RendererOptions::compensate, t is linear sRGB of the target over the luminance of M 1,
+/// Without RendererOptions::compensate, t is linear sRGB of the target over the luminance of full
+/// drive without black,
 /// cut to [0, 1], and the codes are its sRGB encoding: what is shown by someone who knows nothing
 /// of the projector or the surface.
 ///
@@ -84,14 +88,18 @@ class Compensation {
     Eigen::Vector3d drive_of_white;  ///< M^-1 A^-1 W
   };
   [[nodiscard]] const Constants& constants() const { return constants_; }
+  /// Empty without a residual, or without compensation.
+  [[nodiscard]] const calibration::DriveCorrection& correction() const { return correction_; }
   [[nodiscard]] const std::array<ToneLevels, 3>& tone_levels() const { return tone_levels_; }
 
  private:
   void map_to_gamut(const Xyz& target,
+                    const Eigen::Vector3d& wanted_drive,
                     double g,
                     const Eigen::Vector3d& reflectance,
                     CompensatedPixel& pixel) const;
   Constants constants_;
+  calibration::DriveCorrection correction_;
   std::array<ToneLevels, 3> tone_levels_;
 };
 

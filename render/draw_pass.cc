@@ -95,13 +95,18 @@ DrawPass::DrawPass(std::vector<Light> lights,
     : uniforms_(make_buffer(nullptr, sizeof(FrameBlock), GL_DYNAMIC_STORAGE_BIT)),
       lights_(std::move(lights)),
       texture_repeats_(texture_repeats),
-      clip_from_world_(clip_from_projector(profile.geometry) *
-                       profile.geometry.world_from_projector.inverse().matrix()),
-      projector_in_world_(profile.geometry.world_from_projector.translation),
-      reference_distance_m_(profile.reference_distance_m),
       width_(profile.geometry.width),
       height_(profile.geometry.height) {
   VENEER_CHECK(!lights_.empty() && lights_.size() <= kMaxLights);
+  set_projector(profile);
+}
+
+void DrawPass::set_projector(const calibration::ProjectorProfile& profile) {
+  VENEER_CHECK(profile.geometry.width == width_ && profile.geometry.height == height_);
+  clip_from_world_ = clip_from_projector(profile.geometry) *
+                     profile.geometry.world_from_projector.inverse().matrix();
+  projector_in_world_ = profile.geometry.world_from_projector.translation;
+  reference_distance_m_ = profile.reference_distance_m;
 }
 
 Status DrawPass::link(const std::string& fragment_source, const btf::ModelShader& textures) {

@@ -69,6 +69,9 @@ class DrawPass {
                                                      const DirectionalLight& light,
                                                      const Eigen::Vector2d& texture_repeats,
                                                      const calibration::ProjectorProfile& profile);
+  /// From the next draw on, where another profile says that the projector stands; its raster is the
+  /// same (checked).
+  void set_projector(const calibration::ProjectorProfile& profile);
   /// Clears the framebuffer and draws. Sets all GL state that it needs. Evaluated in a compute
   /// pass, only its colour is written, and its depth stays as it was.
   void draw(GLuint framebuffer, const MeshBuffers& mesh, const DrawInput& input) const;
@@ -97,7 +100,7 @@ class DrawPass {
   Eigen::Vector2d texture_repeats_;
   Eigen::Matrix4d clip_from_world_;
   Eigen::Vector3d projector_in_world_;
-  double reference_distance_m_;
+  double reference_distance_m_ = 0;
   int width_;
   int height_;
 };

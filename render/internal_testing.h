@@ -87,6 +87,18 @@ inline calibration::ProjectorProfile example_profile(int width, int height, int 
   return profile;
 }
 
+/// A projector with a white segment of a quarter, crosstalk and primaries that drift, which leaves
+/// the cone of the primaries: rho of ProjectorProfile::residual.
+inline calibration::ColourResidual example_residual() {
+  return calibration::ColourResidual::sampled(17, [](const Eigen::Vector3d& t) -> Eigen::Vector3d {
+    const Eigen::Vector3d segment = t.minCoeff() * Eigen::Vector3d(0.24, 0.25, 0.27);
+    const Eigen::Vector3d crosstalk = -0.05 * t * (t.sum() / 3.0) * (1.0 - t.minCoeff());
+    const Eigen::Vector3d drift =
+        0.03 * Eigen::Vector3d(t.y() * (1 - t.y()), t.z() * (1 - t.z()), -t.x() * (1 - t.x()));
+    return segment + crosstalk + drift;
+  });
+}
+
 /// A surface whose reflectance varies strongly, by other amounts for each primary.
 inline Image<Rgb32f> example_surface_map() {
   Image<Rgb32f> map(7, 5);

@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/renderer.h"
 
-#include <cmath>
-
-#include "base/ipt.h"
 #include "render/compensate_pass.h"
-#include "render/compensation.h"
 #include "render/draw_pass.h"
 #include "render/egl_context.h"
 #include "render/gpu_timer.h"
 #include "render/mesh_buffers.h"
+#include "render/prepared_profile.h"
 
 namespace veneer::render {
 namespace {
@@ -43,31 +40,14 @@ Status check(const Scene& scene) {
   return {};
 }
 
-Status check(const calibration::ProjectorProfile& profile, const RendererOptions& options) {
-  if (!(options.geometry_floor > 0.0) || !std::isfinite(options.geometry_floor))
-    return fail(Errc::kInvalidOption,
-                "making a renderer: geometry_floor is {}; it must be above 0",
-                options.geometry_floor);
-  VENEER_TRY(profile.check());
-  const Xyz white = profile.primaries * Eigen::Vector3d::Ones() + profile.black;
-  if (!((cones_from_xyz() * white).minCoeff() > 0.0))
-    return fail(
-        Errc::kBadFormat,
-        "making a renderer: the profile's white, XYZ {} {} {}, is no colour that an eye can "
-        "see; calibrate again",
-        white.x(),
-        white.y(),
-        white.z());
-  return {};
-}
-
 class GlRenderer final : public Renderer {
  public:
   static Result<std::unique_ptr<Renderer>> create(EglContext context,
                                                   const Scene& scene,
                                                   const btf::Material& material,
-                                                  const calibration::ProjectorProfile& profile,
+                                                  const PreparedProfile& prepared,
                                                   const RendererOptions& options) {
+    const calibration::ProjectorProfile& profile = prepared.profile();
     const DrawOptions draw_options{.cache = options.cache,
                                    .filter = texel_filter(material, options.average_texels),
                                    .evaluation = options.evaluation};
@@ -75,10 +55,10 @@ class GlRenderer final : public Renderer {
         DrawPass draw,
         DrawPass::create(
             material.shader(), scene.lights, scene.texture_repeats, profile, draw_options));
-    const Compensation compensation(profile, options);
-    VENEER_ASSIGN(CompensatePass compensate, CompensatePass::create(compensation, profile));
+    VENEER_ASSIGN(CompensatePass compensate,
+                  CompensatePass::create(prepared, options.exchangeable));
     auto renderer = std::unique_ptr<GlRenderer>(new GlRenderer(
-        std::move(context), scene.mesh, profile.geometry, std::move(draw), std::move(compensate)));
+        std::move(context), scene.mesh, profile, std::move(draw), std::move(compensate)));
     if (glCheckNamedFramebufferStatus(renderer->target_framebuffer_.id(), GL_FRAMEBUFFER) !=
         GL_FRAMEBUFFER_COMPLETE)
       return fail(Errc::kUnavailable,
@@ -87,6 +67,14 @@ class GlRenderer final : public Renderer {
   }
 
   ~GlRenderer() override { context_.make_current(); }
+
+  Status set_profile(const PreparedProfile& prepared) override {
+    VENEER_TRY(check_exchangeable({width_, height_, bits_}, prepared.profile()));
+    context_.make_current();
+    VENEER_TRY(compensate_.set_profile(prepared));
+    draw_.set_projector(prepared.profile());
+    return {};
+  }
 
   void draw(const FrameInput& input) override {
     VENEER_CHECK(input.specular_weight >= 0.0 && input.specular_weight <= 1.0);
@@ -133,12 +121,13 @@ class GlRenderer final : public Renderer {
  private:
   GlRenderer(EglContext context,
              const Mesh& mesh,
-             const calibration::ProjectorGeometry& geometry,
+             const calibration::ProjectorProfile& profile,
              DrawPass draw,
              CompensatePass compensate)
       : context_(std::move(context)),
-        width_(geometry.width),
-        height_(geometry.height),
+        width_(profile.geometry.width),
+        height_(profile.geometry.height),
+        bits_(profile.bits),
         mesh_(mesh),
         target_(make_texture_2d(GL_RGBA16F, width_, height_)),
         depth_(make_texture_2d(GL_DEPTH_COMPONENT32F, width_, height_)),
@@ -164,6 +153,7 @@ class GlRenderer final : public Renderer {
   EglContext context_;  // first, so that it goes last
   int width_;
   int height_;
+  int bits_;
   MeshBuffers mesh_;
   GlTexture target_;
   GlTexture depth_;
@@ -180,9 +170,10 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const Scene& scene,
                                                    const calibration::ProjectorProfile& profile,
                                                    const RendererOptions& options) {
   VENEER_TRY(check(scene));
-  VENEER_TRY(check(profile, options));
+  auto prepared = PreparedProfile::prepare(profile, options);
+  if (!prepared) return fail_while("making a renderer", prepared.error());
   VENEER_ASSIGN(EglContext context, EglContext::create());
-  return GlRenderer::create(std::move(context), scene, material, profile, options);
+  return GlRenderer::create(std::move(context), scene, material, *prepared, options);
 }
 
 }  // namespace veneer::render

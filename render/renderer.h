@@ -19,6 +19,8 @@
 
 namespace veneer::render {
 
+class PreparedProfile;
+
 struct RendererOptions {
   /// Off: the target's luminance is sent as if projector and surface were ideal (sRGB of the target
   /// over the white of the profile), which is what people do without calibration.
@@ -33,6 +35,9 @@ struct RendererOptions {
   bool average_texels = false;
   /// Compute goes without the angular cache.
   Evaluation evaluation = Evaluation::kFragment;
+  /// Profiles will be exchanged while frames are drawn: what another one may need is compiled at
+  /// the start.
+  bool exchangeable = false;
 };
 
 /// What one frame needs to know.
@@ -68,6 +73,10 @@ class Renderer {
       const RendererOptions& options);
   virtual ~Renderer() = default;
 
+  /// From the next frame on, draws for another profile. Only uploads; all that takes long was done
+  /// when the profile was prepared, with this renderer's options.
+  /// Errors: kInvalidOption (another raster or other bits: a restart is needed); the old one stays.
+  [[nodiscard]] virtual Status set_profile(const PreparedProfile& profile) = 0;
   /// Issues the GL commands of one frame. No allocation, no read-back, no wait.
   virtual void draw(const FrameInput& input) = 0;
   /// Waits for the last frame and reads it: codes of ProjectorProfile::bits bits, first row on top.

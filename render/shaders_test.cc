@@ -13,8 +13,9 @@ constexpr char kAnyModel[] =
 
 TEST(Shaders, AreValidByTheReferenceCompiler) {
   if (!has_glslang()) GTEST_SKIP() << "glslangValidator absent: install glslang-tools";
-  EXPECT_EQ(glslang_complaints(compensate_fragment_source(true), "frag"), "");
-  EXPECT_EQ(glslang_complaints(compensate_fragment_source(false), "frag"), "");
+  for (const CompensateKind kind :
+       {CompensateKind::kNone, CompensateKind::kPlain, CompensateKind::kResidual})
+    EXPECT_EQ(glslang_complaints(compensate_fragment_source(kind), "frag"), "");
   EXPECT_EQ(glslang_complaints(fullscreen_vertex_source(), "vert"), "");
   EXPECT_EQ(glslang_complaints(count_compute_source(), "comp"), "");
   EXPECT_EQ(glslang_complaints(plain_fragment_source(), "frag"), "");

@@ -14,6 +14,8 @@ layout(std140, binding = 1) uniform Compensation {
   float gamut_tolerance;
   float dither;  // 1: on
   int gamut_steps;
+  vec4 correction_full;   // DriveCorrection::Axes; read with RESIDUAL alone
+  ivec4 correction_axes;  // steps, below, nodes - 1
 } constants;
 
 layout(binding = 0) uniform sampler2D target_texture;
@@ -21,6 +23,9 @@ layout(binding = 1) uniform sampler2D vignetting_texture;
 layout(binding = 2) uniform usampler2D seeds_texture;  // row: channel; lowest and highest level
 layout(binding = 3) uniform sampler2D levels_texture;  // output and code, LEVELS_WIDTH to a row
 layout(binding = 4) uniform sampler2D reflectance_texture;  // of the raster's size, or one texel
+#ifdef RESIDUAL
+layout(binding = 5) uniform sampler3D correction_texture;  // tau - t* of every node
+#endif
 uniform uint dither_seed;
 
 layout(location = 0) out uvec4 codes;  // a: PixelState << 14 | gamut loss in units of 1/64
@@ -44,24 +49,76 @@ bool is_inside(vec3 drive, float tolerance) {
   return smallest(drive) >= -tolerance && largest(drive) <= 1.0 + tolerance;
 }
 
+#ifdef RESIDUAL
+const bool kCorrects = true;
+
+// tau of a wanted linear drive: DriveCorrection.
+vec3 corrected(vec3 wanted) {
+  vec3 part = wanted / constants.correction_full.xyz;
+  int last_node = constants.correction_axes.z;
+  vec3 node = sign(part) * sqrt(abs(part)) * float(constants.correction_axes.x) +
+              float(constants.correction_axes.y);
+  node = clamp(node, 0.0, float(last_node));
+  ivec3 cell = min(ivec3(node), last_node - 1);
+  vec3 f = node - vec3(cell);
+  // From the cell's lowest corner to its highest, along the axis with the largest part first.
+  float most = largest(f);
+  float least = smallest(f);
+  float middle = f.x + f.y + f.z - most - least;
+  const ivec3 kX = ivec3(1, 0, 0);
+  const ivec3 kY = ivec3(0, 1, 0);
+  const ivec3 kZ = ivec3(0, 0, 1);
+  ivec3 first = f.x >= f.y ? (f.x >= f.z ? kX : kZ) : (f.y >= f.z ? kY : kZ);
+  ivec3 last = f.x < f.y ? (f.x < f.z ? kX : kZ) : (f.y < f.z ? kY : kZ);
+  vec3 correction = (1.0 - most) * texelFetch(correction_texture, cell, 0).rgb;
+  correction += (most - middle) * texelFetch(correction_texture, cell + first, 0).rgb;
+  correction += (middle - least) * texelFetch(correction_texture, cell + 1 - last, 0).rgb;
+  correction += least * texelFetch(correction_texture, cell + 1, 0).rgb;
+  return wanted + correction;
+}
+vec3 full_drive() { return constants.correction_full.xyz; }
+#else
+const bool kCorrects = false;
+vec3 corrected(vec3 wanted) { return wanted; }
+vec3 full_drive() { return vec3(1.0); }
+#endif
+
 // The drive nearest to the target in its own hue, and the loss in IPT x 100.
-vec4 map_to_gamut(vec3 target, vec3 drive, float g, vec3 reflectance, int steps) {
+vec4 map_to_gamut(vec3 target, vec3 wanted_drive, vec3 drive, float g, vec3 reflectance,
+                  int steps) {
   vec3 gain = g * reflectance;
   vec3 offset = constants.drive_of_ambient.xyz / g + constants.drive_of_black.xyz;
   vec3 wanted = kIptFromPowers * signed_power(mat3(constants.cones_from_target) * target, kIptExponent);
 
   vec3 neutral = constants.drive_of_white.xyz / gain;
   vec3 at_zero = offset / neutral;
-  vec3 at_one = (1.0 + offset) / neutral;
+  vec3 at_one = (full_drive() + offset) / neutral;
   float darkest = max(0.0, largest(min(at_zero, at_one)));
   float brightest = smallest(max(at_zero, at_one));
-  if (!(darkest <= brightest)) {
-    drive = clamp(drive, 0.0, 1.0);
-    vec3 shown = mat3(constants.cones_from_drive) * ((drive + offset) * gain);
-    return vec4(drive, 100.0 * distance(wanted, kIptFromPowers * signed_power(shown, kIptExponent)));
-  }
+  bool any_neutral = darkest <= brightest;
   float low = pow(darkest, kIptExponent);
   float high = pow(brightest, kIptExponent);
+  if (kCorrects && any_neutral) {
+    float way_left = 0.5 * (high - low);
+    float highest = low;
+    low = high;
+    high = highest;
+    for (int i = 0; i < steps; ++i) {
+      vec3 darker = corrected(neutral * pow(low - way_left, 1.0 / kIptExponent) - offset);
+      vec3 brighter = corrected(neutral * pow(high + way_left, 1.0 / kIptExponent) - offset);
+      if (smallest(darker) >= 0.0) low -= way_left;
+      if (largest(brighter) <= 1.0) high += way_left;
+      way_left *= 0.5;
+    }
+    any_neutral = low <= high;
+  }
+  if (!any_neutral) {
+    vec3 clamped = clamp(drive, 0.0, 1.0);
+    vec3 shown_drive = kCorrects ? wanted_drive + (clamped - drive) : clamped;
+    vec3 shown = mat3(constants.cones_from_drive) * ((shown_drive + offset) * gain);
+    return vec4(clamped,
+                100.0 * distance(wanted, kIptFromPowers * signed_power(shown, kIptExponent)));
+  }
   float quarter = 0.25 * (high - low);
   vec3 anchor = vec3(clamp(wanted.x, low + quarter, high - quarter), 0.0, 0.0);
   vec3 way = wanted - anchor;
@@ -77,10 +134,12 @@ vec4 map_to_gamut(vec3 target, vec3 drive, float g, vec3 reflectance, int steps)
   float part = 0.5;
   vec3 mapped = neutral * pow(anchor.x, 1.0 / kIptExponent) - offset;
   // A count that is no constant keeps compilers from unrolling: software rasterisers do not skip a
-  // branch that no pixel takes, but they leave a loop.
+  // branch that no pixel takes, but they leave a loop, even one of a single turn.
+  for (int i = 0; kCorrects && i < min(steps, 1); ++i) mapped = corrected(mapped);
   for (int i = 0; i < steps; ++i) {
     vec3 powers = powers_at_anchor + (kept + part) * powers_along_way;
-    vec3 tried = drive_from_cones * signed_power(powers, 1.0 / kIptExponent) - offset;
+    vec3 tried =
+        corrected(drive_from_cones * signed_power(powers, 1.0 / kIptExponent) - offset);
     if (is_inside(tried, 0.0)) {
       kept += part;
       mapped = tried;
@@ -150,15 +209,17 @@ void main() {
     codes.a = kOutOfReach << 14;
     return;
   }
-  vec3 drive = (mat3(constants.drive_from_target) * texel.rgb / reflectance -
-                constants.drive_of_ambient.xyz) / g -
-               constants.drive_of_black.xyz;
+  vec3 wanted_drive = (mat3(constants.drive_from_target) * texel.rgb / reflectance -
+                       constants.drive_of_ambient.xyz) / g -
+                      constants.drive_of_black.xyz;
+  vec3 drive = corrected(wanted_drive);
   uint state = kInGamut;
   float loss = 0.0;
   if (!is_inside(drive, constants.gamut_tolerance)) {
     state = kOutOfGamut;
 #ifdef COMPENSATE
-    vec4 mapped = map_to_gamut(texel.rgb, drive, g, reflectance, constants.gamut_steps);
+    vec4 mapped =
+        map_to_gamut(texel.rgb, wanted_drive, drive, g, reflectance, constants.gamut_steps);
     drive = mapped.xyz;
     loss = mapped.w;
 #endif
