@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 
 #include "btf/material.h"
-#include "calibration/profile.h"
+#include "calibration/profile_store.h"
 #include "daemon/config.h"
+#include "daemon/profile_watcher.h"
 #include "daemon/recording_tracker.h"
 #include "projector/outputs.h"
 #include "tracking/drivers.h"
@@ -18,9 +20,12 @@ namespace veneer::daemon {
 Result<Summary> run(const std::filesystem::path& config_path,
                     const std::vector<std::string>& settings,
                     const std::atomic<bool>& stop,
-                    Progress& progress) {
+                    Progress& progress,
+                    std::atomic<bool>* check_profile) {
   VENEER_ASSIGN(TomlReader toml, TomlReader::open(config_path, settings));
-  VENEER_ASSIGN(const Config config, Config::read(toml));
+  VENEER_ASSIGN(Config config, Config::read(toml));
+  // On a virtual clock a run is repeatable, so that nothing may come in between.
+  config.render.exchangeable = config.clock == ClockKind::kMonotonic;
 
   // Mistakes in the configuration are found before any device is touched for long: opening is
   // quick.
@@ -45,8 +50,12 @@ Result<Summary> run(const std::filesystem::path& config_path,
 
   VENEER_ASSIGN(const render::Scene scene, render::Scene::load(config.scene));
   VENEER_ASSIGN(const std::unique_ptr<btf::Material> material, btf::load_material(config.material));
-  VENEER_ASSIGN(const calibration::ProjectorProfile profile,
-                calibration::ProjectorProfile::load(config.profile));
+  // Before it is read, so that one that comes while we start is noticed.
+  const auto known_profile = ProfileWatcher::identify(config.profile);
+  VENEER_ASSIGN(const calibration::ProfileStore::Loaded loaded,
+                calibration::ProfileStore(config.profile).load_newest_good());
+  if (!loaded.warning.empty()) spdlog::warn("{}", loaded.warning);
+  const calibration::ProjectorProfile& profile = loaded.profile;
   VENEER_ASSIGN(const std::unique_ptr<render::Renderer> renderer,
                 render::Renderer::create(scene, *material, profile, config.render));
   spdlog::info(
@@ -60,9 +69,14 @@ Result<Summary> run(const std::filesystem::path& config_path,
   std::ranges::sort(bodies);
   bodies.erase(std::unique(bodies.begin(), bodies.end()), bodies.end());
   PoseFeed poses(*tracker, *clock, config.clock, bodies, config.prediction, config.validation);
-  const Raster raster{profile.geometry.width, profile.geometry.height, profile.bits};
-  FrameLoop loop(config, scene, raster, *clock, poses, *renderer, *output);
+  const render::RasterFormat raster{profile.geometry.width, profile.geometry.height, profile.bits};
+  std::optional<ProfileWatcher> profiles;
+  if (config.render.exchangeable)
+    profiles.emplace(config.profile, known_profile, raster, config.render, check_profile);
+  FrameLoop loop(
+      config, scene, raster, *clock, poses, *renderer, *output, profiles ? &*profiles : nullptr);
   VENEER_ASSIGN(const RunRecord record, loop.run(stop, progress));
+  if (profiles) profiles->stop();
 
   Summary summary = summarise(record);
   summary.rejected_poses = poses.rejected();
@@ -76,6 +90,7 @@ Result<Summary> run(const std::filesystem::path& config_path,
   summary.clock = config.clock == ClockKind::kVirtual ? "virtual" : "monotonic";
   summary.settings = settings;
   summary.bits = profile.bits;
+  if (profiles) summary.profiles = profiles->counts();
   summary.tracker_start = tracker_start;
   if (!config.summary.empty()) VENEER_TRY(write_summary(summary, config.summary));
   if (!config.frame_log.empty()) VENEER_TRY(write_frame_log(record, config.frame_log));

@@ -14,11 +14,16 @@ namespace veneer::daemon {
 
 /// Opens all that the configuration names, runs the frame loop until its end or until `stop`, and
 /// writes the summary and frame log that it asks for.
+/// In real time, a profile that takes the place of the configured one is drawn with from the next
+/// frame on (ProfileWatcher). One that is damaged at the start is replaced by the newest good one
+/// of its history (ProfileStore), with a warning.
 /// @param settings  "key = value" lines that replace what the file says.
+/// @param check_profile  borrowed, may be null: see ProfileWatcher.
 /// Errors: those of every part; nothing has been shown if it fails before the first frame.
 [[nodiscard]] Result<Summary> run(const std::filesystem::path& config_path,
                                   const std::vector<std::string>& settings,
                                   const std::atomic<bool>& stop,
-                                  Progress& progress);
+                                  Progress& progress,
+                                  std::atomic<bool>* check_profile = nullptr);
 
 }  // namespace veneer::daemon

@@ -22,11 +22,12 @@ double milliseconds_since(SteadyTime begin) {
 
 FrameLoop::FrameLoop(const Config& config,
                      const render::Scene& scene,
-                     const Raster& raster,
+                     const render::RasterFormat& raster,
                      Clock& clock,
                      PoseFeed& poses,
                      render::Renderer& renderer,
-                     projector::Output& output)
+                     projector::Output& output,
+                     ProfileWatcher* profiles)
     : config_(config),
       scene_(scene),
       raster_(raster),
@@ -36,6 +37,7 @@ FrameLoop::FrameLoop(const Config& config,
       object_(config.presence),
       renderer_(renderer),
       output_(output),
+      profiles_(profiles),
       codes_(raster.width, raster.height),
       target_(raster.width, raster.height) {}
 
@@ -131,6 +133,8 @@ Result<RunRecord> FrameLoop::run(const std::atomic<bool>& stop, Progress& progre
       spdlog::warn("{}; the picture stays as for the last pose", poses_.health().error().what);
     }
     if (record.frame_ms > 1e3 * to_seconds(period)) ++run.late;
+    // In the time that is left of the period.
+    if (profiles_ != nullptr) profiles_->apply(renderer_);
     // The next frame starts on the next period that has not begun yet; those in between are lost.
     start += period;
     if (const Time now = clock_.now(); now > start) {

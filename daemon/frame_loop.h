@@ -14,7 +14,9 @@
 #include "daemon/config.h"
 #include "daemon/observers.h"
 #include "daemon/pose_feed.h"
+#include "daemon/profile_watcher.h"
 #include "projector/output.h"
+#include "render/prepared_profile.h"
 #include "render/renderer.h"
 #include "render/scene.h"
 
@@ -46,24 +48,19 @@ struct RunRecord {
   std::uint64_t lost = 0;  ///< of these, frames for an observer who was lost
 };
 
-/// The projector's raster.
-struct Raster {
-  int width = 0;
-  int height = 0;
-  int bits = 8;
-};
-
 /// Tracker -> predict -> draw -> compensate -> present, once a frame period. Borrows all it is
 /// given.
 class FrameLoop {
  public:
+  /// @param profiles  asked for another profile after every frame; null where it stays.
   FrameLoop(const Config& config,
             const render::Scene& scene,
-            const Raster& raster,
+            const render::RasterFormat& raster,
             Clock& clock,
             PoseFeed& poses,
             render::Renderer& renderer,
-            projector::Output& output);
+            projector::Output& output,
+            ProfileWatcher* profiles = nullptr);
   /// Runs until Config::frames are made or `stop` becomes true.
   /// Errors: kTimeout (no first pose), kDisconnected (tracker gone before it), what the output
   /// says.
@@ -75,13 +72,14 @@ class FrameLoop {
 
   const Config& config_;
   const render::Scene& scene_;
-  Raster raster_;
+  render::RasterFormat raster_;
   Clock& clock_;
   PoseFeed& poses_;
   Observers observers_;
   tracking::PresenceFilter object_;
   render::Renderer& renderer_;
   projector::Output& output_;
+  ProfileWatcher* profiles_;
   Image<Rgb16> codes_;
   Image<Rgb32f> target_;
   bool tracker_lost_ = false;  // and said so

@@ -17,6 +17,10 @@ static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler sets it"
 
 void request_stop(int) { stop_requested = true; }
 
+std::atomic<bool> profile_check_requested{false};
+
+void request_profile_check(int) { profile_check_requested = true; }
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -44,11 +48,17 @@ int main(int argc, char** argv) {
   action.sa_handler = request_stop;
   sigaction(SIGTERM, &action, nullptr);
   sigaction(SIGINT, &action, nullptr);
+  action.sa_handler = request_profile_check;
+  sigaction(SIGHUP, &action, nullptr);
 
   SilentProgress silent;
   const std::unique_ptr<Progress> progress = quiet ? nullptr : make_progress();
-  const Result<daemon::Summary> summary = daemon::run(
-      config, settings, stop_requested, quiet ? static_cast<Progress&>(silent) : *progress);
+  const Result<daemon::Summary> summary =
+      daemon::run(config,
+                  settings,
+                  stop_requested,
+                  quiet ? static_cast<Progress&>(silent) : *progress,
+                  &profile_check_requested);
   if (!summary) {
     spdlog::error("{}", summary.error().what);
     return exit_code_of(summary.error());

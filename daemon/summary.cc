@@ -113,6 +113,9 @@ Status write_summary(const Summary& summary, const std::filesystem::path& path) 
       {"clock", summary.clock},
       {"settings", summary.settings},
       {"bits", summary.bits},
+      {"profile_reloads", summary.profiles.reloads},
+      {"profile_refusals", summary.profiles.refusals},
+      {"profile_swap_ms_max", summary.profiles.longest_swap_ms},
       {"tracker_start_ns", summary.tracker_start.time_since_epoch().count()},
   };
   return write_text(path, json.dump(2) + "\n");

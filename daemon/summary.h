@@ -6,6 +6,7 @@
 
 #include "base/result.h"
 #include "daemon/frame_loop.h"
+#include "daemon/profile_watcher.h"
 
 namespace veneer::daemon {
 
@@ -35,6 +36,7 @@ struct Summary {
   std::string clock;                  ///< "monotonic" or "virtual"
   std::vector<std::string> settings;  ///< that replaced values of the configuration
   int bits = 0;                       ///< of a drive code
+  ProfileCounts profiles;             ///< that appeared during the run
   Time tracker_start;                 ///< time zero of a simulated tracker's paths
 };
 

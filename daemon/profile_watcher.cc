@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/profile_watcher.h"
+
+#include <spdlog/spdlog.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+namespace veneer::daemon {
+namespace {
+
+using SteadyClockPoint = std::chrono::steady_clock::time_point;
+
+// A signal handler can only set a flag, so that the watcher looks at it this often.
+constexpr std::chrono::milliseconds kFlagInterval{50};
+
+double milliseconds_since(SteadyClockPoint begin) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
+      .count();
+}
+
+}  // namespace
+
+struct ProfileWatcher::HandOver {
+  render::PreparedProfile profile;
+  Status taken;
+  double swap_ms = 0;
+};
+
+std::optional<ProfileWatcher::Identity> ProfileWatcher::identify(
+    const std::filesystem::path& folder) {
+  struct stat status {};
+  if (::stat((folder / "profile.json").c_str(), &status) != 0) return std::nullopt;
+  return Identity{
+      status.st_dev, status.st_ino, status.st_mtim.tv_sec, status.st_mtim.tv_nsec, status.st_size};
+}
+
+ProfileWatcher::ProfileWatcher(std::filesystem::path folder,
+                               const std::optional<Identity>& known,
+                               const render::RasterFormat& raster,
+                               const render::RendererOptions& options,
+                               std::atomic<bool>* check_now,
+                               const WatchOptions& watch)
+    : folder_(std::move(folder)),
+      raster_(raster),
+      options_(options),
+      check_now_(check_now),
+      interval_(watch.interval),
+      watcher_([this, known](const std::stop_token& stop) { this->watch(stop, known); }) {}
+
+ProfileWatcher::~ProfileWatcher() {
+  stop();
+  delete prepared_.exchange(nullptr);
+  delete used_.exchange(nullptr);
+}
+
+void ProfileWatcher::refuse(const Error& error) {
+  ++refusals_;
+  spdlog::warn("the new projector profile is refused, the old one stays: {}", error.what);
+}
+
+// Prepares what is in the folder and leaves it for the frame loop; false where the folder was
+// exchanged meanwhile, so that it must be read again.
+bool ProfileWatcher::read(const Identity& found) {
+  auto profile = calibration::ProjectorProfile::load(folder_);
+  if (identify(folder_) != std::optional(found)) return false;
+  if (!profile) {
+    refuse(profile.error());
+    return true;
+  }
+  if (const Status fits = render::check_exchangeable(raster_, *profile); !fits) {
+    refuse(fits.error());
+    return true;
+  }
+  auto prepared = render::PreparedProfile::prepare(std::move(*profile), options_);
+  if (!prepared) {
+    refuse(prepared.error());
+    return true;
+  }
+  auto next = std::make_unique<HandOver>(HandOver{std::move(*prepared), {}, 0});
+  // One that the frame loop has not taken yet is overtaken.
+  delete prepared_.exchange(next.release());
+  return true;
+}
+
+void ProfileWatcher::dispose_of_used() {
+  const std::unique_ptr<HandOver> used(used_.exchange(nullptr));
+  if (!used) return;
+  if (!used->taken) {
+    refuse(used->taken.error());
+    return;
+  }
+  ++reloads_;
+  longest_swap_ms_ = std::max(longest_swap_ms_.load(), used->swap_ms);
+  spdlog::info("the projector profile was exchanged in {:.1f} ms", used->swap_ms);
+}
+
+void ProfileWatcher::watch(const std::stop_token& stop, std::optional<Identity> known) {
+  SteadyClockPoint looked = std::chrono::steady_clock::now();
+  while (!stop.stop_requested()) {
+    std::this_thread::sleep_for(std::min(kFlagInterval, interval_));
+    dispose_of_used();
+    const bool asked = check_now_ != nullptr && check_now_->exchange(false);
+    const SteadyClockPoint now = std::chrono::steady_clock::now();
+    if (!asked && now - looked < interval_) continue;
+    looked = now;
+    const std::optional<Identity> found = identify(folder_);
+    if (!found || (found == known && !asked)) continue;
+    if (read(*found)) known = found;
+  }
+  dispose_of_used();
+}
+
+void ProfileWatcher::apply(render::Renderer& renderer) {
+  // The last one must have been disposed of, so that none is lost.
+  if (prepared_.load(std::memory_order_relaxed) == nullptr || used_.load() != nullptr) return;
+  HandOver* next = prepared_.exchange(nullptr);
+  if (next == nullptr) return;
+  const SteadyClockPoint begin = std::chrono::steady_clock::now();
+  next->taken = renderer.set_profile(next->profile);
+  next->swap_ms = milliseconds_since(begin);
+  used_.store(next);
+}
+
+void ProfileWatcher::stop() {
+  watcher_.request_stop();
+  if (watcher_.joinable()) watcher_.join();
+}
+
+ProfileCounts ProfileWatcher::counts() const { return {reloads_, refusals_, longest_swap_ms_}; }
+
+}  // namespace veneer::daemon

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <stop_token>
+#include <thread>
+
+#include "base/result.h"
+#include "render/prepared_profile.h"
+#include "render/renderer.h"
+
+namespace veneer::daemon {
+
+struct WatchOptions {
+  /// Between two looks at the folder. A calibration takes minutes; a second more does not matter,
+  /// and asking works on every file system. At least 1 ms.
+  std::chrono::milliseconds interval{1000};
+};
+
+/// What became of profiles that appeared while the daemon ran.
+struct ProfileCounts {
+  std::uint64_t reloads = 0;
+  std::uint64_t refusals = 0;  ///< damaged, or not for this raster
+  double longest_swap_ms = 0;  ///< on the frame loop's thread
+};
+
+/// Watches a profile's folder. A thread of its own loads and prepares what appears there; the frame
+/// loop takes it between two frames, without waiting, and hands it back to be disposed of. What
+/// cannot be read or does not fit is refused with one line in the log, and the old one stays. A
+/// folder without a profile.json is left alone: a profile that takes its place comes by rename.
+class ProfileWatcher {
+ public:
+  /// Which profile.json stands in a folder: one that took its place is another file, one that was
+  /// written over has another time.
+  struct Identity {
+    std::uint64_t device = 0;
+    std::uint64_t file = 0;
+    std::int64_t seconds = 0;
+    std::int64_t nanoseconds = 0;
+    std::int64_t bytes = 0;
+    bool operator==(const Identity&) const = default;
+  };
+  /// None where there is no such file: between two renames, or for good.
+  [[nodiscard]] static std::optional<Identity> identify(const std::filesystem::path& folder);
+
+  /// @param known  what stood in the folder before the renderer's profile was read from it.
+  /// @param raster, options  the renderer's.
+  /// @param check_now  borrowed, may be null: once true, the folder is read at once, changed or
+  /// not,
+  ///                   and the flag is cleared.
+  ProfileWatcher(std::filesystem::path folder,
+                 const std::optional<Identity>& known,
+                 const render::RasterFormat& raster,
+                 const render::RendererOptions& options,
+                 std::atomic<bool>* check_now,
+                 const WatchOptions& watch = {});
+  ~ProfileWatcher();
+  ProfileWatcher(const ProfileWatcher&) = delete;
+  ProfileWatcher& operator=(const ProfileWatcher&) = delete;
+
+  /// For the frame loop: gives a newly prepared profile, if there is one, to the renderer. Never
+  /// waits, and allocates only what GL does.
+  void apply(render::Renderer& renderer);
+  /// Ends the thread; what was applied is counted after that.
+  void stop();
+  [[nodiscard]] ProfileCounts counts() const;
+
+ private:
+  struct HandOver;
+  void watch(const std::stop_token& stop, std::optional<Identity> known);
+  [[nodiscard]] bool read(const Identity& found);
+  void dispose_of_used();
+  void refuse(const Error& error);
+
+  const std::filesystem::path folder_;
+  const render::RasterFormat raster_;
+  const render::RendererOptions options_;
+  std::atomic<bool>* const check_now_;
+  const std::chrono::milliseconds interval_;
+  // Owned by whoever exchanges them for null: to the frame loop, and back from it.
+  std::atomic<HandOver*> prepared_{nullptr};
+  std::atomic<HandOver*> used_{nullptr};
+  std::atomic<std::uint64_t> reloads_{0};
+  std::atomic<std::uint64_t> refusals_{0};
+  std::atomic<double> longest_swap_ms_{0};
+  std::jthread watcher_;  // last: it stops before what it uses goes
+};
+
+}  // namespace veneer::daemon
