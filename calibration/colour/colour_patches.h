@@ -24,7 +24,7 @@ struct ColourPatchOptions {
   int grey_levels = 16;
   /// Nodes along an axis of the cube of mixtures, black included, for models of interaction: the
   /// cube^3 patches less the ones that are there already. 0 or 2 to 9.
-  int cube = 5;
+  int cube = 4;
   /// Readings of each patch in additivity_patches(). 1 to 100.
   int additivity_repeats = 4;
   [[nodiscard]] Status check() const;

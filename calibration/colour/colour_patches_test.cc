@@ -57,8 +57,8 @@ TEST(InteractionPatches, AreMixturesOfLevelsThatTheRampsHave) {
     for (std::size_t c = 0; c < 3; ++c) levels[c].insert(code[c]);
   }
   const std::vector<Rgb16> mixtures = interaction_patches(options);
-  // 5^3 less black and 12 single levels, and the 12 greys that are not in the cube.
-  EXPECT_EQ(mixtures.size(), 125U - 1 - 12 + 12);
+  // 4^3 less black and 9 single levels, and the 13 greys that are not in the cube.
+  EXPECT_EQ(mixtures.size(), 64U - 1 - 9 + 13);
   for (const Rgb16& code : mixtures) {
     EXPECT_GE(driven(code), 2);
     for (std::size_t c = 0; c < 3; ++c) EXPECT_TRUE(levels[c].contains(code[c])) << code[c];

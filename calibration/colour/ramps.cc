@@ -191,4 +191,10 @@ bool are_independent(const Eigen::Matrix3d& primaries) {
          lengths.minCoeff() > 0;
 }
 
+double perceptual_weight(double light) {
+  // Below a hundredth of full output the slope of L* stops growing.
+  constexpr double kLinearPart = 0.01;
+  return std::pow(light + kLinearPart, -2.0 / 3.0);
+}
+
 }  // namespace veneer::calibration

@@ -51,4 +51,8 @@ inline constexpr double kLargestFall = 0.02;
 /// a thousandth of the volume that they would span at right angles.
 [[nodiscard]] bool are_independent(const Eigen::Matrix3d& primaries);
 
+/// How much an error in a reading weighs: lightness goes with the cube root of the light, so its
+/// slope is light^(-2/3). @param light  in parts of full output, >= 0.
+[[nodiscard]] double perceptual_weight(double light);
+
 }  // namespace veneer::calibration

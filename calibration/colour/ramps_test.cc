@@ -153,5 +153,14 @@ TEST(Mixtures, AreThePatchesOfSeveralChannels) {
     EXPECT_GE((mixture.drive.array() > 0.0).count(), 2) << mixture.drive.transpose();
 }
 
+TEST(PerceptualWeight, FallsAndIsFiniteAtZero) {
+  EXPECT_TRUE(std::isfinite(perceptual_weight(0.0)));
+  double last = perceptual_weight(0.0);
+  for (double light = 0.01; light <= 1.5; light += 0.01) {
+    EXPECT_LT(perceptual_weight(light), last);
+    last = perceptual_weight(light);
+  }
+}
+
 }  // namespace
 }  // namespace veneer::calibration

@@ -69,12 +69,6 @@ ChannelFit fit_channel(const ChannelRamp& ramp) {
 
 }  // namespace
 
-double perceptual_weight(double light) {
-  // Below a hundredth of full output the slope of L* stops growing.
-  constexpr double kLinearPart = 0.01;
-  return std::pow(light + kLinearPart, -2.0 / 3.0);
-}
-
 Result<std::unique_ptr<ColourModel>> fit_gog(std::span<const PatchReading> patches,
                                              const Xyz& black) {
   VENEER_ASSIGN(const ChannelRamps ramps, read_ramps(patches, black));

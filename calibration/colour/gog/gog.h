@@ -17,8 +17,4 @@ namespace veneer::calibration {
 [[nodiscard]] Result<std::unique_ptr<ColourModel>> fit_gog(std::span<const PatchReading> patches,
                                                            const Xyz& black);
 
-/// How much an error in a reading weighs: lightness goes with the cube root of the light, so its
-/// slope is light^(-2/3). @param light  in parts of full output, >= 0.
-[[nodiscard]] double perceptual_weight(double light);
-
 }  // namespace veneer::calibration

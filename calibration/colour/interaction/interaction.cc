@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "calibration/colour/cube_model.h"
-#include "calibration/colour/gog/gog.h"
 #include "calibration/colour/pca_spline/pca_spline.h"
 #include "calibration/colour/ramps.h"
 

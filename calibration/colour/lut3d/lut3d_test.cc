@@ -110,7 +110,7 @@ TEST(Lut3d, SaysHowManyMixturesAreMissing) {
   ASSERT_GT(missing, 0U);
   const auto model = fit_lut3d(readings.patches, readings.black);
   ASSERT_FALSE(model.has_value());
-  EXPECT_NE(model.error().what.find(fmt::format("{} of the 125 mixtures", missing)),
+  EXPECT_NE(model.error().what.find(fmt::format("{} of the 64 mixtures", missing)),
             std::string::npos)
       << model.error().what;
 }
