@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <string>
+#include <vector>
 
 namespace veneer::calibration {
 namespace {

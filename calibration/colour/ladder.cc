@@ -111,6 +111,7 @@ std::span<const LadderRung> ladder_rungs() {
       LadderRung{"25 % white segment", {0, 0.25, 0}, 16},
       LadderRung{"5 % channel crosstalk", {0, 0, 0.05}, 16},
       LadderRung{"drift + crosstalk", {0.06, 0, 0.05}, 16},
+      LadderRung{"all three", {0.06, 0.25, 0.05}, 16},
   };
   return kRungs;
 }

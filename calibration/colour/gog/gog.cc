@@ -2,6 +2,7 @@
 #include "calibration/colour/gog/gog.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 

@@ -3,6 +3,8 @@
 
 #include <Eigen/QR>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 #include <vector>

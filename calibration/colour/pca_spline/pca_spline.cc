@@ -3,6 +3,7 @@
 
 #include <Eigen/SVD>
 
+#include <array>
 #include <utility>
 #include <vector>
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/colour/plvc/plvc.h"
 
+#include <array>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "calibration/colour/additive_model.h"

@@ -2,6 +2,7 @@
 #include "calibration/colour/white_segment/white_segment.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <utility>
