@@ -20,6 +20,10 @@ class CommandLine {
 
   /// Where a command declares its options, before parse().
   [[nodiscard]] CLI::App& app() { return app_; }
+  /// For commands that do different things; empty without arguments. Before parse().
+  [[nodiscard]] std::string first_argument() const {
+    return arguments_.empty() ? "" : arguments_.front();
+  }
   /// Reads the arguments into the declared options. Throws CLI::ParseError, which main() turns into
   /// help or a usage error.
   void parse();

@@ -4,11 +4,13 @@
 #include "base/exit_code.h"
 #include "calibration/verification.h"
 #include "cli/bench_profile.h"
+#include "cli/commands/calibrate_geometry.h"
 #include "cli/commands/commands.h"
 
 namespace veneer::cli {
 
 Result<int> run_calibrate(CommandLine& line) {
+  if (line.first_argument() == "geometry") return calibrate_geometry(line);
   std::filesystem::path bench_path;
   std::filesystem::path out;
   int patches = 64;
