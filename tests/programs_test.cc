@@ -307,6 +307,13 @@ TEST_F(ProgramsTest, VerifyingALaterRunSeesWhatCompensationIsWorth) {
                              text("cloth.btfset") + " --run " + folder_->path().string();
   const Outcome compensated = run(verify);
   ASSERT_EQ(compensated.exit_code, 0) << compensated.err;
+  // Held against what was meant to be drawn, the error of the fit is gone.
+  const Outcome fitted =
+      run("veneer verify --json --quiet --bench " VENEER_ETC "/benches/demo.toml --material " +
+          text("material.safetensors") + " --run " + folder_->path().string());
+  ASSERT_EQ(fitted.exit_code, 0) << fitted.err;
+  EXPECT_LT(nlohmann::json::parse(fitted.out).at("de00_mean").get<double>(),
+            nlohmann::json::parse(compensated.out).at("de00_mean").get<double>());
   ASSERT_EQ(
       run("veneerd --config " + config + " --set frames=2 --set render.compensate=false").exit_code,
       0);

@@ -54,16 +54,24 @@ Result<int> run_verify(CommandLine& line) {
       app.add_option("--profile", profile, "A profile to hold against readings of the bench");
   auto* run_option = app.add_option(
       "--run", options.run, "The folder of a run of veneerd, to be seen on the bench");
-  app.add_option("--set", options.set, "The sample set of its material")->needs(run_option);
+  auto* set_option =
+      app.add_option("--set", options.set, "The sample set of its material")->needs(run_option);
+  app.add_option("--material",
+                 options.material,
+                 "In place of the set: its fitted material, so that the error of the fit is left "
+                 "out")
+      ->needs(run_option)
+      ->excludes(set_option);
   app.add_option("--every", options.every, "Look at every n-th recorded frame")
       ->capture_default_str();
   app.add_option("--pictures", options.pictures, "Folder for pictures of what is seen");
   run_option->excludes(profile_option);
   line.parse();
   if (!profile.empty()) return verify_patches(line, options.bench, profile);
-  if (options.run.empty() || options.set.empty()) {
+  if (options.run.empty() || (options.set.empty() && options.material.empty())) {
     return fail(Errc::kInvalidOption,
-                "say what to verify: --profile PROFILE, or --run FOLDER with --set SET");
+                "say what to verify: --profile PROFILE, or --run FOLDER with --set SET or "
+                "--material MATERIAL");
   }
 
   VENEER_ASSIGN(const RunVerification result, verify_run(options, line.progress()));

@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <memory>
+#include <utility>
 
 #include "base/image_files.h"
 #include "base/statistics.h"
 #include "btf/interpolated_set.h"
+#include "btf/material.h"
 #include "cli/report/pictures.h"
 #include "cli/report/recorded_run.h"
 #include "render/scene.h"
@@ -44,6 +47,29 @@ Result<Image<Rgb16>> read_codes(const fs::path& path, int bits) {
   }
   return image;
 }
+
+/// What the eye should have received, of the one kind or the other.
+class Truth {
+ public:
+  [[nodiscard]] static Result<Truth> open(const VerificationOptions& options) {
+    Truth truth;
+    if (options.set.empty()) {
+      VENEER_ASSIGN(truth.material_, btf::load_material(options.material));
+    } else {
+      VENEER_ASSIGN(btf::SampleSet set, btf::SampleSet::open(options.set));
+      truth.set_ = std::make_unique<const btf::InterpolatedSet>(std::move(set));
+    }
+    return truth;
+  }
+  /// Borrows from this.
+  [[nodiscard]] simulation::TexelSource source() const {
+    return set_ ? simulation::texel_source(*set_) : simulation::texel_source(*material_);
+  }
+
+ private:
+  std::unique_ptr<const btf::InterpolatedSet> set_;
+  std::unique_ptr<const btf::Material> material_;
+};
 
 /// dE00 of the covered pixels, split by whether they are within gamut, over several frames.
 struct Pool {
@@ -139,9 +165,8 @@ Result<RunVerification> verify_run(const VerificationOptions& options, Progress&
                 bench->truth().object.mesh,
                 bits);
   }
-  VENEER_ASSIGN(btf::SampleSet set, btf::SampleSet::open(options.set));
-  const btf::InterpolatedSet interpolated(std::move(set));
-  const simulation::TexelSource material = simulation::texel_source(interpolated);
+  VENEER_ASSIGN(const Truth truth, Truth::open(options));
+  const simulation::TexelSource material = truth.source();
   const std::vector<BenchLight> lights = bench_lights(scene.lights);
   VENEER_ASSIGN(const Xyz white, bench->white(scene.world_from_object));
   const PictureWriter pictures(options.pictures, white.y());

@@ -20,11 +20,14 @@ struct VerificationOptions {
   /// Its sub-folder with frames of the same walk without compensation; none where empty.
   std::string uncompensated;
   std::filesystem::path bench;  ///< bench.toml, the hidden truth
-  std::filesystem::path set;    ///< the sample set that the material was fitted to
+  /// The sample set that the material was fitted to: what the eye should have received.
+  std::filesystem::path set;
   /// Looks at every n-th recorded frame. >= 1.
   int every = 1;
   /// Folder to which pictures of each looked-at frame are written; none where empty.
   std::filesystem::path pictures;
+  /// The fitted material, taken where `set` is empty: the error of the fit is left out.
+  std::filesystem::path material{};
 };
 
 /// One frame as the eye received it. "Covered" are the pixels that lie wholly on the object,
@@ -57,8 +60,8 @@ inline constexpr double kDifferenceScale = 10;
 /// Shows the frames of a run on the virtual bench, from the true place of the eye at the moment of
 /// display, and compares what is received with what the material would have sent. The object's pose
 /// and mesh are known to both sides; the bench refuses a run on another mesh or of another depth.
-/// Errors: those of RecordedRun, Scene, Bench and SampleSet; kInvalidOption (run and bench do not
-/// fit); kBadFormat (the eye saw nothing of the object).
+/// Errors: those of RecordedRun, Scene, Bench, SampleSet and load_material; kInvalidOption (run and
+/// bench do not fit); kBadFormat (the eye saw nothing of the object).
 [[nodiscard]] Result<RunVerification> verify_run(const VerificationOptions& options,
                                                  Progress& progress);
 

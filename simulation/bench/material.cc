@@ -12,4 +12,12 @@ TexelSource texel_source(const btf::InterpolatedSet& set) {
           }};
 }
 
+TexelSource texel_source(const btf::Material& material) {
+  return {material.width(),
+          material.height(),
+          [&material](int texel, const Eigen::Vector3d& view, const Eigen::Vector3d& light) {
+            return material.radiance(texel, view, light);
+          }};
+}
+
 }  // namespace veneer::simulation

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <span>
+#include <string_view>
 
 #include "simulation/bench/testing.h"
 
@@ -115,6 +117,38 @@ TEST_F(MaterialTruthTest, TheLocalFrameIsTangentUpNormal) {
   EXPECT_TRUE(seen_light.isApprox(light, 1e-9)) << seen_light.transpose();
   EXPECT_TRUE(seen_view.isApprox(Eigen::Vector3d(0.3, 0.4, 1.2).normalized(), 1e-9))
       << seen_view.transpose();
+}
+
+/// Two texels that send `light.z` times one and two.
+class TwoLambertTexels final : public btf::Material {
+ public:
+  [[nodiscard]] std::string_view model() const override { return "two-lambert-texels"; }
+  [[nodiscard]] int width() const override { return 2; }
+  [[nodiscard]] int height() const override { return 1; }
+  [[nodiscard]] const btf::DirectionSet& views() const override { return directions_; }
+  [[nodiscard]] const btf::DirectionSet& lights() const override { return directions_; }
+  void reconstruct(int /*texel*/, std::span<float> /*rgb*/) const override {}
+  [[nodiscard]] Eigen::Vector3d radiance(int texel,
+                                         const btf::Direction& /*view*/,
+                                         const btf::Direction& light) const override {
+    return Eigen::Vector3d::Constant((texel + 1) * light.z());
+  }
+  [[nodiscard]] btf::ModelShader shader() const override { return {}; }
+  [[nodiscard]] double values_per_texel() const override { return 1; }
+  [[nodiscard]] Contents contents() const override { return {}; }
+
+ private:
+  btf::DirectionSet directions_ = btf::bonn_directions();
+};
+
+TEST_F(MaterialTruthTest, AFittedMaterialSendsItsOwnRadiance) {
+  const TwoLambertTexels material;
+  make({}, {0, 0, 1}, 0.075);  // columns 8 to 56 of 64
+  const BenchLight light{BenchLight::Kind::kDirectional, {0, 0.6, 0.8}, {2, 2, 2}};
+  const Image<Rgb32f> picture =
+      bench_->material_truth(view_, texel_source(material), {1, 1}, {light});
+  EXPECT_NEAR(at(picture, 20, 24).x(), 2 * 0.8, 1e-5) << "the left texel";
+  EXPECT_NEAR(at(picture, 44, 24).x(), 4 * 0.8, 1e-5) << "the right one";
 }
 
 TEST_F(MaterialTruthTest, ASetOfAWhiteLambertSampleSendsTheCosine) {
