@@ -102,13 +102,15 @@ GlTexture upload_seeds(const Compensation& compensation) {
 }
 
 // The levels of all channels one after the other, in rows of kLevelsWidth.
-GlTexture upload_levels(const Compensation& compensation) {
+GlTexture upload_levels(const PreparedProfile& profile) {
   std::vector<std::array<float, 2>> texels;
-  for (const ToneLevels& tone : compensation.tone_levels()) {
+  for (const ToneLevels& tone : profile.compensation().tone_levels()) {
     for (std::size_t i = 0; i < tone.levels().size(); ++i)
       texels.push_back({tone.levels()[i], static_cast<float>(tone.codes()[i])});
   }
-  const auto rows = static_cast<int>((texels.size() + kLevelsWidth - 1) / kLevelsWidth);
+  // Room for every code, so that the texture's size depends on the bits alone (see warm_up()).
+  const int codes = 3 << profile.profile().bits;
+  const int rows = (codes + kLevelsWidth - 1) / kLevelsWidth;
   texels.resize(static_cast<std::size_t>(rows) * kLevelsWidth);
   GlTexture texture = make_texture_2d(GL_RG32F, kLevelsWidth, rows);
   glTextureSubImage2D(texture.id(), 0, 0, 0, kLevelsWidth, rows, GL_RG, GL_FLOAT, texels.data());
@@ -178,21 +180,22 @@ Status CompensatePass::link(CompensateKind kind) {
   return {};
 }
 
-// Drivers finish compiling when a program first draws: one pixel, which the next run overwrites.
-// The kind is not the current one, so that a residual's texture is not there yet.
-Status CompensatePass::warm_up(CompensateKind kind) {
-  VENEER_TRY(link(kind));
-  const CompensateKind current = std::exchange(kind_, kind);
-  if (kind == CompensateKind::kResidual) {
-    const auto nothing = [](const Eigen::Vector3d&) { return Eigen::Vector3d(0, 0, 0); };
-    profile_.correction = upload_correction(
-        calibration::DriveCorrection(calibration::ColourResidual::sampled(2, nothing), 5));
+// Drivers finish compiling when a program first draws, some anew for each kind of texture that it
+// reads (llvmpipe: whether a size is a power of two). So every kind of profile draws one pixel
+// here, which the next run overwrites, from textures like those that it will have.
+Status CompensatePass::warm_up() {
+  const GlTexture target = make_texture_2d(GL_RGBA16F, width_, height_);
+  const GlTexture even = make_texture_2d(GL_RGB32F, 1, 1);
+  const GlTexture patterned = make_texture_2d(GL_RGB32F, width_, height_);
+  const auto nothing = [](const Eigen::Vector3d&) { return Eigen::Vector3d(0, 0, 0); };
+  const GlTexture correction = upload_correction(calibration::DriveCorrection(
+      calibration::ColourResidual::sampled(2, nothing), calibration::DriveCorrection::kNodes));
+  for (const CompensateKind kind : {CompensateKind::kPlain, CompensateKind::kResidual}) {
+    VENEER_TRY(link(kind));
+    for (const GLuint reflectance : {even.id(), patterned.id()})
+      compensate({kind, target.id(), reflectance, correction.id()}, 0, 1, 1);
   }
-  const GlTexture target = make_texture_2d(GL_RGBA16F, 1, 1);
-  compensate(target.id(), 0, 1, 1);
   glFinish();
-  if (kind == CompensateKind::kResidual) profile_.correction = {};
-  kind_ = current;
   return {};
 }
 
@@ -201,7 +204,7 @@ CompensatePass::ProfileTextures CompensatePass::upload(const PreparedProfile& pr
   const ConstantsBlock block = block_of(compensation);
   return {make_buffer(&block, sizeof(block), 0),
           upload_seeds(compensation),
-          upload_levels(compensation),
+          upload_levels(profile),
           upload_image(GL_R32F, GL_RED, profile.vignetting()),
           upload_image(GL_RGB32F, GL_RGB, profile.reflectance()),
           upload_correction(compensation.correction())};
@@ -230,10 +233,7 @@ Result<CompensatePass> CompensatePass::create(const PreparedProfile& profile, bo
   pass.framebuffer_ = make_framebuffer();
   glNamedFramebufferTexture(pass.framebuffer_.id(), GL_COLOR_ATTACHMENT0, pass.codes_.id(), 0);
   pass.no_vertices_ = make_vertex_array();
-  if (exchangeable && pass.kind_ != CompensateKind::kNone) {
-    for (const CompensateKind kind : {CompensateKind::kPlain, CompensateKind::kResidual})
-      if (kind != pass.kind_) VENEER_TRY(pass.warm_up(kind));
-  }
+  if (exchangeable && pass.kind_ != CompensateKind::kNone) VENEER_TRY(pass.warm_up());
 
   GLint alignment = 1;
   glGetIntegerv(GL_SHADER_STORAGE_BUFFER_OFFSET_ALIGNMENT, &alignment);
@@ -260,8 +260,11 @@ CompensatePass::~CompensatePass() {
   for (const InFlight& slot : ring_) glDeleteSync(slot.fence);  // null is ignored
 }
 
-void CompensatePass::compensate(GLuint target, std::uint32_t dither_seed, int width, int height) {
-  const Program& program = programs_[static_cast<std::size_t>(kind_)];
+void CompensatePass::compensate(const Bound& bound,
+                                std::uint32_t dither_seed,
+                                int width,
+                                int height) {
+  const Program& program = programs_[static_cast<std::size_t>(bound.kind)];
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.id());
   glViewport(0, 0, width, height);
   glDisable(GL_DEPTH_TEST);
@@ -269,18 +272,21 @@ void CompensatePass::compensate(GLuint target, std::uint32_t dither_seed, int wi
   glUseProgram(program.program.id());
   glProgramUniform1ui(program.program.id(), program.seed_location, dither_seed);
   glBindBufferBase(GL_UNIFORM_BUFFER, 1, profile_.constants.id());
-  glBindTextureUnit(0, target);
+  glBindTextureUnit(0, bound.target);
   glBindTextureUnit(1, profile_.vignetting.id());
   glBindTextureUnit(2, profile_.seeds.id());
   glBindTextureUnit(3, profile_.levels.id());
-  glBindTextureUnit(4, profile_.reflectance.id());
-  if (kind_ == CompensateKind::kResidual) glBindTextureUnit(5, profile_.correction.id());
+  glBindTextureUnit(4, bound.reflectance);
+  if (bound.kind == CompensateKind::kResidual) glBindTextureUnit(5, bound.correction);
   glBindVertexArray(no_vertices_.id());
   glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
 void CompensatePass::run(GLuint target, std::uint32_t dither_seed) {
-  compensate(target, dither_seed, width_, height_);
+  compensate({kind_, target, profile_.reflectance.id(), profile_.correction.id()},
+             dither_seed,
+             width_,
+             height_);
 
   const std::size_t index = frame_ % kRing;
   InFlight& slot = ring_[index];

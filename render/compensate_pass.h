@@ -81,9 +81,16 @@ class CompensatePass {
   };
   CompensatePass() = default;
   [[nodiscard]] Status link(CompensateKind kind);
-  [[nodiscard]] Status warm_up(CompensateKind kind);
+  [[nodiscard]] Status warm_up();
   static ProfileTextures upload(const PreparedProfile& profile);
-  void compensate(GLuint target, std::uint32_t dither_seed, int width, int height);
+  // What a draw binds beside the profile's other textures.
+  struct Bound {
+    CompensateKind kind;
+    GLuint target;
+    GLuint reflectance;
+    GLuint correction;
+  };
+  void compensate(const Bound& bound, std::uint32_t dither_seed, int width, int height);
 
   std::array<Program, 3> programs_;  // indexed by CompensateKind
   CompensateKind kind_ = CompensateKind::kPlain;
