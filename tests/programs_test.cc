@@ -4,10 +4,12 @@
 #include <nlohmann/json.hpp>
 #include <sys/wait.h>
 
+#include <array>
 #include <chrono>
 #include <csignal>
 #include <fstream>
 #include <thread>
+#include <utility>
 
 #include "base/files.h"
 #include "base/safetensors.h"
@@ -54,6 +56,13 @@ class ProgramsTest : public testing::Test {
     fs::remove_all(at(name));
     fs::copy(at("cloth.btfset"), at(name), fs::copy_options::recursive);
     return at(name);
+  }
+  /// Puts a copy of the profile in a place, as a calibration does.
+  static void publish_profile(const std::string& name) {
+    StagedFolder staged = StagedFolder::create(at(name)).value();
+    for (const auto& entry : fs::directory_iterator(at("profile")))
+      fs::copy(entry.path(), staged.path() / entry.path().filename());
+    ASSERT_TRUE(staged.commit());
   }
   static void cut_in_half(const fs::path& file) { fs::resize_file(file, fs::file_size(file) / 2); }
 
@@ -348,6 +357,124 @@ TEST_F(ProgramsTest, TheDaemonStopsCleanlyOnSigterm) {
   EXPECT_EQ(WEXITSTATUS(status), 0);
   const auto json = nlohmann::json::parse(read_text(at("stopped.json")).value_or("{}"));
   EXPECT_GE(json.value("frames", 0), 2);
+}
+
+/// A daemon that runs in real time without an output until it is stopped.
+class RunningDaemon {
+ public:
+  RunningDaemon(const std::string& config, const std::string& name, double frame_rate_hz)
+      : log_(fmt::format("{}.log", name)) {
+    fs::remove(log_);  // of one before
+    pid_ = ::fork();
+    if (pid_ != 0) return;
+    const std::string command = fmt::format(
+        "exec {}/veneerd --config {} --set 'clock=\"monotonic\"' --set frames=0 "
+        "--set frame_rate_hz={} --set 'output={{driver=\"null\"}}' --set 'profile=\"{}\"' "
+        "--set 'summary=\"{}.json\"' 2>{}",
+        VENEER_PROGRAMS,
+        config,
+        frame_rate_hz,
+        name,
+        name,
+        log_.string());
+    ::execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
+    ::_exit(127);
+  }
+  RunningDaemon(const RunningDaemon&) = delete;
+  RunningDaemon& operator=(const RunningDaemon&) = delete;
+  ~RunningDaemon() {
+    if (pid_ > 0) ::kill(pid_, SIGKILL);
+  }
+  void hang_up() const { ::kill(pid_, SIGHUP); }
+  [[nodiscard]] std::string log() const { return read_text(log_).value_or(""); }
+  /// Waits until the log says `what` so many times; a minute is enough even under a sanitizer.
+  [[nodiscard]] bool says(std::string_view what, int times = 1) const {
+    for (int i = 0; i < 3000; ++i) {
+      const std::string text = log();
+      int found = 0;
+      for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1))
+        ++found;
+      if (found >= times) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    return false;
+  }
+  /// Its exit status.
+  int stop() {
+    ::kill(pid_, SIGTERM);
+    int status = 0;
+    ::waitpid(std::exchange(pid_, -1), &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  }
+
+ private:
+  fs::path log_;
+  pid_t pid_ = -1;
+};
+
+TEST_F(ProgramsTest, TheDaemonTakesNewProfilesAndRefusesADamagedOne) {
+  publish_profile("live");
+  RunningDaemon daemon(text("veneer.toml"), text("live"), 10);
+  ASSERT_TRUE(daemon.says("output:")) << daemon.log();
+  const std::string exchanged = "profile was exchanged";
+  for (int times = 1; times <= 3; ++times) {
+    publish_profile("live");
+    ASSERT_TRUE(daemon.says(exchanged, times)) << daemon.log();
+  }
+  daemon.hang_up();
+  ASSERT_TRUE(daemon.says(exchanged, 4)) << "what did not change is read again: " << daemon.log();
+  cut_in_half(at("live") / "vignetting.exr");
+  daemon.hang_up();
+  ASSERT_TRUE(daemon.says("vignetting.exr was changed or damaged")) << daemon.log();
+  publish_profile("live");
+  ASSERT_TRUE(daemon.says(exchanged, 5)) << daemon.log();
+  ASSERT_EQ(daemon.stop(), 0) << daemon.log();
+
+  const auto summary = nlohmann::json::parse(read_text(at("live.json")).value());
+  EXPECT_EQ(summary.at("profile_reloads"), 5);
+  EXPECT_EQ(summary.at("profile_refusals"), 1);
+  EXPECT_GT(summary.at("profile_swap_ms_max"), 0);
+}
+
+TEST_F(ProgramsTest, ExchangingProfilesDropsNoFrame) {
+  // Another program may take the machine for a moment in either run; a daemon that drops a frame
+  // for every profile does so each time.
+  constexpr int kTries = 4;
+  constexpr int kExchanges = 3;
+  bool as_few = false;
+  for (int i = 0; i < kTries && !as_few; ++i) {
+    std::array<std::uint64_t, 2> dropped{};
+    for (const bool exchange : {false, true}) {
+      publish_profile("live");
+      RunningDaemon daemon(text("veneer.toml"), text("live"), 5);
+      ASSERT_TRUE(daemon.says("output:")) << daemon.log();
+      const auto begin = std::chrono::steady_clock::now();
+      for (int times = 1; exchange && times <= kExchanges; ++times) {
+        publish_profile("live");
+        ASSERT_TRUE(daemon.says("profile was exchanged", times)) << daemon.log();
+      }
+      // Either run takes as long, so that it has as much opportunity.
+      std::this_thread::sleep_until(begin + std::chrono::seconds(2 * kExchanges));
+      ASSERT_EQ(daemon.stop(), 0) << daemon.log();
+      const auto summary = nlohmann::json::parse(read_text(at("live.json")).value());
+      EXPECT_EQ(summary.at("profile_reloads"), exchange ? kExchanges : 0);
+      dropped[exchange ? 1 : 0] = summary.at("dropped_frames").get<std::uint64_t>();
+    }
+    as_few = dropped[1] <= dropped[0];
+  }
+  EXPECT_TRUE(as_few) << "exchanging profiles dropped frames in all of " << kTries << " tries";
+}
+
+TEST_F(ProgramsTest, TheDaemonStartsWithAnOlderProfileWhereTheNewestIsDamaged) {
+  for (const char* name : {"aged", "aged.history/2026-01-02T03-04-05.678Z"}) {
+    fs::create_directories(at(name).parent_path());
+    fs::copy(at("profile"), at(name), fs::copy_options::recursive);
+  }
+  cut_in_half(at("aged") / "profile.json");
+  const Outcome outcome =
+      run("veneerd --config " + text("veneer.toml") + " --set frames=1 --set 'profile=\"aged\"'");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("2026-01-02T03-04-05.678Z"), std::string::npos) << outcome.err;
 }
 
 TEST_F(ProgramsTest, RenderWritesAPictureOrALuminanceImage) {
