@@ -40,7 +40,8 @@ struct MeasuredPatches {
 [[nodiscard]] Result<MeasuredPatches> read_ti3(const std::filesystem::path& path);
 
 /// RGB in 0 to 100 and XYZ in cd/m^2, not normalised, as `colprof` takes it.
-/// Errors: kBadFormat (no patches or too many, values that are not finite, drives outside [0, 1]).
+/// Errors: kBadFormat (no patches or too many, values that are not finite, drives outside [0, 1],
+/// no drive above 0.01 though not all are 0: nobody could tell the scale).
 [[nodiscard]] Result<std::string> ti3_text(const MeasuredPatches& measured);
 /// Errors: as above, and kIo.
 [[nodiscard]] Status write_ti3(const std::filesystem::path& path, const MeasuredPatches& measured);

@@ -45,7 +45,7 @@ struct CubeTable {
 [[nodiscard]] Result<CubeTable> parse_cube(std::string_view text, std::string_view origin);
 /// Errors: kNotFound, kIo, and as above.
 [[nodiscard]] Result<CubeTable> read_cube(const std::filesystem::path& path);
-/// With nine digits, so that what was a float comes back as it was. Errors: kBadFormat.
+/// With nine significant digits. Errors: kBadFormat.
 [[nodiscard]] Result<std::string> cube_text(const CubeTable& table);
 /// Errors: kBadFormat, kIo.
 [[nodiscard]] Status write_cube(const std::filesystem::path& path, const CubeTable& table);

@@ -19,7 +19,7 @@ namespace veneer::calibration {
 /// What an ICC profile of a projector is made from.
 struct IccSource {
   std::string description = "Veneer projector";  ///< ASCII
-  /// Per channel, relative output over equal steps of the drive from 0 to 1; 2 to 65535 values in
+  /// Per channel, relative output over equal steps of the drive from 0 to 1; 2 to 65536 values in
   /// [0, 1]. More than 4096 are thinned out, which is what the format's readers put up with.
   std::array<std::vector<double>, 3> tone_curves;
   Eigen::Matrix3d primaries = Eigen::Matrix3d::Identity();  ///< columns XYZ of R, G, B, cd/m^2

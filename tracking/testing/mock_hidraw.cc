@@ -213,9 +213,16 @@ gboolean HidrawDevice::on_read(UMockdevIoctlBase*, UMockdevIoctlClient* client, 
 }
 
 gboolean HidrawDevice::on_write(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self) {
-  const bool plugged = static_cast<HidrawDevice*>(self)->is_plugged();
-  const int size = umockdev_ioctl_client_get_arg(client)->data_len;
-  umockdev_ioctl_client_complete(client, plugged ? size : -1, plugged ? 0 : ENODEV);
+  auto& device = *static_cast<HidrawDevice*>(self);
+  const bool plugged = device.is_plugged();
+  const UMockdevIoctlData* const written = umockdev_ioctl_client_get_arg(client);
+  const auto size = static_cast<std::size_t>(written->data_len);
+  if (plugged && device.on_output_) {
+    const auto* begin = reinterpret_cast<const std::byte*>(written->data);
+    device.on_output_(Bytes(begin, begin + size));
+  }
+  umockdev_ioctl_client_complete(
+      client, plugged ? static_cast<glong>(size) : -1, plugged ? 0 : ENODEV);
   return TRUE;
 }
 

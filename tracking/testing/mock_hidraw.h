@@ -28,6 +28,10 @@ class HidrawDevice {
   /// before plug().
   using OnFeature = std::function<int(const Bytes& report)>;
 
+  /// Hears every output report, its number in front, as hidapi wrote it; may send() replies. Called
+  /// on umockdev's thread.
+  using OnOutput = std::function<void(const Bytes& report)>;
+
   explicit HidrawDevice(HidDescription description, OnFeature on_feature = {});
   ~HidrawDevice();
   HidrawDevice(const HidrawDevice&) = delete;
@@ -38,6 +42,8 @@ class HidrawDevice {
   /// As it is pulled out: whoever polls is hung up on, reports that were not read are lost.
   void unplug();
   [[nodiscard]] bool is_plugged() const;
+  /// Set it before plug().
+  void on_output(OnOutput on_output) { on_output_ = std::move(on_output); }
   /// For the next plug.
   void move_to(std::string usb_port) { description_.usb_port = std::move(usb_port); }
   [[nodiscard]] const std::string& node() const { return node_; }
@@ -70,6 +76,7 @@ class HidrawDevice {
 
   HidDescription description_;
   OnFeature on_feature_;
+  OnOutput on_output_;
   UMockdevIoctlBase* handler_;
   std::string node_;
   std::string hid_path_;  // below /sys; the node's own is below that

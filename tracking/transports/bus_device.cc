@@ -13,8 +13,6 @@
 namespace veneer::tracking {
 namespace {
 
-constexpr std::string_view kUdevRule = "etc/udev/60-veneer-trackers.rules";
-
 std::string_view attribute(udev_device* device, const char* name) {
   const char* value = device != nullptr ? udev_device_get_sysattr_value(device, name) : nullptr;
   return value != nullptr ? value : "";
@@ -141,7 +139,10 @@ std::string identity_text(const BusDevice& device) {
                                : fmt::format("serial number {}", device.serial);
 }
 
-Error open_error(const std::string& name, const BusDevice& device, int error) {
+Error open_error(const std::string& name,
+                 const BusDevice& device,
+                 int error,
+                 std::string_view udev_rule) {
   const std::string doing =
       fmt::format("opening {} with {} ({})", name, identity_text(device), device.node);
   switch (error) {
@@ -151,7 +152,7 @@ Error open_error(const std::string& name, const BusDevice& device, int error) {
               fmt::format("{}: permission denied; copy {} to /etc/udev/rules.d, run \"udevadm "
                           "control --reload\", join the group plugdev, and plug it in again",
                           doing,
-                          kUdevRule)};
+                          udev_rule)};
     case EBUSY:
       return {Errc::kUnavailable,
               doing +

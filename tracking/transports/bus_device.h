@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -11,6 +12,9 @@
 #include "base/toml_reader.h"
 
 namespace veneer::tracking {
+
+/// Gives permission to open trackers.
+inline constexpr std::string_view kTrackersUdevRule = "etc/udev/60-veneer-trackers.rules";
 
 /// What the system lists devices under.
 enum class DeviceClass { kUsb, kHidraw };
@@ -69,7 +73,11 @@ class UsbIdentity {
 /// "serial number 1234", or "usb port 1-2" where it has none.
 [[nodiscard]] std::string identity_text(const BusDevice& device);
 /// Why a device that is there could not be opened, and what to do; `error` is an errno.
-[[nodiscard]] Error open_error(const std::string& name, const BusDevice& device, int error);
+/// @param udev_rule  the file that gives permission, for the text.
+[[nodiscard]] Error open_error(const std::string& name,
+                               const BusDevice& device,
+                               int error,
+                               std::string_view udev_rule = kTrackersUdevRule);
 /// That it waits for its firmware, and what loads it.
 [[nodiscard]] Error firmware_error(const std::string& name, const BusDevice& device);
 

@@ -22,12 +22,14 @@ const unsigned char* as_chars(std::span<const std::byte> bytes) {
   return reinterpret_cast<const unsigned char*>(bytes.data());
 }
 
-Result<HidHandle> open_node(const std::string& name, const BusDevice& device) {
+Result<HidHandle> open_node(const std::string& name,
+                            const BusDevice& device,
+                            std::string_view udev_rule) {
   HidHandle handle(hid_open_path(device.node.c_str()));
   if (handle) return handle;
   // hidapi tells a sentence, but no cause; the system does.
   const int error = ::access(device.node.c_str(), R_OK | W_OK) == 0 ? EIO : errno;
-  return tl::unexpected<Error>(open_error(name, device, error));
+  return tl::unexpected<Error>(open_error(name, device, error, udev_rule));
 }
 
 /// The open device. Closed at its first failure: hidapi does not tell an unplug from anything else,
@@ -129,9 +131,9 @@ Result<std::unique_ptr<Transport>> HidPort::open() {
                   "again if this lasts",
                   description());
     }
-    VENEER_ASSIGN(control, open_node(name_, *partner));
+    VENEER_ASSIGN(control, open_node(name_, *partner, model_.udev_rule));
   }
-  VENEER_ASSIGN(HidHandle data, open_node(name_, chosen));
+  VENEER_ASSIGN(HidHandle data, open_node(name_, chosen, model_.udev_rule));
   identity_.remember(chosen);
   opened_ = chosen.id;
   return std::make_unique<HidTransport>(std::move(data), std::move(control), clock_);

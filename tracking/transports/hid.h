@@ -19,6 +19,7 @@ struct HidModel {
   int interface = 0;       ///< whose reports are read
   /// Where feature reports go, if not to the same one.
   std::optional<int> control_interface;
+  std::string udev_rule{kTrackersUdevRule};  ///< that gives permission to open it, for texts
 };
 
 /// A HID device, over hidapi: reports come in whole, feature reports go out.

@@ -13,8 +13,8 @@
 // What the ColorHug2 says and is told, byte by byte; nothing of how it is transported.
 //
 // Reports have 64 bytes and no number. A request is the command and its data, little-endian; the
-// reply is a return value, the command that it answers, and data. Source: the layout as colord's
-// plug-in uses it (docs/REFERENCES.md); no code of it was taken.
+// reply is a return value, the command that it answers, and data. Source: the layout that colord's
+// plug-in for it shows; no code of it was taken.
 namespace veneer::calibration::colorhug {
 
 inline constexpr std::size_t kReportSize = 64;

@@ -47,7 +47,6 @@ class ChildTerminal {
   pid_t process_ = -1;  // -1: waited for
   UniqueFd terminal_;
   int wait_status_ = 0;
-  bool was_killed_ = false;
 };
 
 }  // namespace veneer::calibration

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
+#include "calibration/instruments/spotread/spotread_output.h"
+#include "calibration/testing/fuzzing.h"
+
+namespace veneer::calibration {
+namespace {
+
+bool is_printable(const std::string& text) {
+  return std::ranges::all_of(text, [](char c) { return c >= ' ' && c <= '~'; });
+}
+
+/// The first byte says in what pieces the rest comes. Texts are printable and of bounded length,
+/// readings are numbers.
+std::string read(std::string_view text) {
+  if (text.empty()) return "";
+  const std::size_t piece = static_cast<unsigned char>(text[0]) + std::size_t{1};
+  spotread::Output output;
+  for (std::size_t at = 1; at < text.size(); at += piece) {
+    output.feed(text.substr(at, piece));
+    while (const auto event = output.next()) {
+      if (!event->xyz.allFinite()) return "a reading is not finite";
+      if (!is_printable(event->text)) return "a text is not printable";
+      if (event->text.size() > 2 * spotread::Output::kLongestLine) return "a text has no bounds";
+    }
+    if (!is_printable(output.complaint())) return "a complaint is not printable";
+  }
+  return "";
+}
+
+}  // namespace
+
+const FuzzedReader& fuzzed_reader() {
+  static const FuzzedReader kReader{
+      &read,
+      {"\x10\nPlace cap on the instrument, or place on a dark surface,\n and then hit any key to "
+       "continue,\n or hit Esc or Q to abort: \nHit ESC or Q to exit, any other key to take a "
+       "reading: \n Result is XYZ: 211.83 218.63 232.52, D50 Lab: 1 2 3\n",
+       "\x03\nSpot read failed due to misread (x)\nHit Esc or Q to give up, any other key to "
+       "retry:",
+       "\xFFspotread: Error - No instrument at port 1\nany other key to use reading:"}};
+  return kReader;
+}
+
+}  // namespace veneer::calibration

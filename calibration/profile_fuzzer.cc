@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <nlohmann/json.hpp>
+#include <zlib.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "base/files.h"
+#include "base/testing/temporary_folder.h"
+#include "calibration/profile.h"
+#include "calibration/testing/fuzzing.h"
+
+namespace veneer::calibration {
+namespace {
+
+using Json = nlohmann::json;
+
+ProjectorProfile small_profile() {
+  ProjectorProfile profile;
+  profile.geometry = {4, 3, 5, 5, 2, 1.5, {}};
+  profile.bits = 2;
+  for (auto& curve : profile.tone_curves) curve = {0, 0.25, 0.5, 1};
+  profile.vignetting = Image<float>(1, 1, 1.0F);
+  return profile;
+}
+
+/// A folder with a good profile, whose profile.json is written over again and again.
+const std::filesystem::path& folder() {
+  static const TemporaryFolder kFolder;
+  static const std::filesystem::path kProfile = [] {
+    const std::filesystem::path path = kFolder.path() / "profile";
+    VENEER_CHECK(small_profile().save(path).has_value());
+    return path;
+  }();
+  return kProfile;
+}
+
+/// The manifest with the checksum that its contents have: what an attacker or a bug could write.
+std::string with_checksum(const std::string& text) {
+  Json json = Json::parse(text, nullptr, false);
+  if (!json.is_object() || !json.contains("profile")) return text;
+  try {
+    const std::string profile = json["profile"].dump();
+    const uLong crc = crc32_z(0, reinterpret_cast<const Bytef*>(profile.data()), profile.size());
+    json["checksum"] = fmt::format("crc32:{:08x}", crc);
+    return json.dump();
+  } catch (const Json::exception&) {
+    return text;
+  }
+}
+
+/// A refusal has a text; what was loaded passes its own check.
+std::string read(std::string_view text) {
+  for (const std::string& manifest : {std::string(text), with_checksum(std::string(text))}) {
+    std::ofstream(folder() / "profile.json", std::ios::binary) << manifest;
+    const auto profile = ProjectorProfile::load(folder());
+    if (!profile && profile.error().what.empty()) return "a refusal without a text";
+    if (profile && !profile->check()) return "what was loaded does not pass";
+  }
+  return "";
+}
+
+}  // namespace
+
+const FuzzedReader& fuzzed_reader() {
+  static const FuzzedReader kReader{&read, {read_text(folder() / "profile.json").value_or("{}")}};
+  return kReader;
+}
+
+}  // namespace veneer::calibration
