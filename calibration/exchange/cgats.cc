@@ -197,7 +197,9 @@ Result<Table> Table::load(std::string_view text,
   cmsIT8SetTable(table, 0);
   char** names = nullptr;
   const int fields = cmsIT8EnumDataFormat(table, &names);
-  for (int i = 0; i < fields; ++i) result.fields_.emplace_back(names[i] != nullptr ? names[i] : "");
+  // A table may declare columns and then not name them.
+  for (int i = 0; names != nullptr && i < fields; ++i)
+    result.fields_.emplace_back(names[i] != nullptr ? names[i] : "");
   const std::optional<double> rows = number_from(result.property("NUMBER_OF_SETS"));
   if (fields <= 0 || !rows || *rows < 1 || *rows > kMostSamples)
     return fail(Errc::kBadFormat, "reading {}: it holds no samples; export it again", origin);
