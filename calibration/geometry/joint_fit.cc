@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
 #include <algorithm>
@@ -8,36 +7,18 @@
 #include <limits>
 #include <memory>
 
+#include "calibration/geometry/internal_ceres.h"
 #include "calibration/geometry/internal_joint_fit.h"
+#include "calibration/geometry/internal_pose_block.h"
+#include "calibration/geometry/internal_projection.h"
 
 namespace veneer::geometry {
 namespace {
 
 constexpr int kLensSize = 9;
 using LensBlock = std::array<double, kLensSize>;  // fx fy cx cy k1 k2 p1 p2 k3
-using PoseBlock = std::array<double, 6>;          // rotation vector, translation
-
-LensBlock block_of(const Lens& lens) {
-  return {lens.fx, lens.fy, lens.cx, lens.cy, lens.k1, lens.k2, lens.p1, lens.p2, lens.k3};
-}
 
 Lens lens_of(const LensBlock& b) { return {b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7], b[8]}; }
-
-PoseBlock block_of(const RigidTransform& pose) {
-  const Eigen::AngleAxisd turn(pose.rotation);
-  const Eigen::Vector3d rotation = turn.angle() * turn.axis();
-  const Eigen::Vector3d& t = pose.translation;
-  return {rotation.x(), rotation.y(), rotation.z(), t.x(), t.y(), t.z()};
-}
-
-RigidTransform pose_of(const PoseBlock& b) {
-  const Eigen::Vector3d rotation(b[0], b[1], b[2]);
-  const double angle = rotation.norm();
-  RigidTransform pose;
-  if (angle > 0) pose.rotation = Eigen::AngleAxisd(angle, rotation / angle);
-  pose.translation = {b[3], b[4], b[5]};
-  return pose;
-}
 
 /// The coefficients that stay where they are.
 std::vector<int> fixed_of(LensModel model) {
@@ -58,18 +39,11 @@ void transform(const T* pose, const T* point, T* out) {
   for (int i = 0; i < 3; ++i) out[i] += pose[3 + i];
 }
 
-/// Lens::project for any number type, minus the pixel that was seen.
 template <class T>
 bool lens_residual(const T* lens, const T* point, const Eigen::Vector2d& seen, T* residual) {
-  if (!(point[2] > T(0))) return false;
-  const T x = point[0] / point[2];
-  const T y = point[1] / point[2];
-  const T r2 = x * x + y * y;
-  const T radial = T(1) + r2 * (lens[4] + r2 * (lens[5] + r2 * lens[8]));
-  const T dx = T(2) * lens[6] * x * y + lens[7] * (r2 + T(2) * x * x);
-  const T dy = lens[6] * (r2 + T(2) * y * y) + T(2) * lens[7] * x * y;
-  residual[0] = lens[0] * (x * radial + dx) + lens[2] - seen.x();
-  residual[1] = lens[1] * (y * radial + dy) + lens[3] - seen.y();
+  if (!project_with(lens, point, residual)) return false;
+  residual[0] -= seen.x();
+  residual[1] -= seen.y();
   return true;
 }
 
@@ -108,8 +82,8 @@ struct ProjectorResidual {
 class JointProblem {
  public:
   JointProblem(std::span<const View> views, const FitModel& model, const Estimate& estimate)
-      : camera_(block_of(estimate.rig.camera)),
-        projector_(block_of(estimate.rig.projector)),
+      : camera_(estimate.rig.camera.coefficients()),
+        projector_(estimate.rig.projector.coefficients()),
         rig_(block_of(estimate.rig.projector_from_camera)) {
     for (const RigidTransform& pose : estimate.camera_from_object) poses_.push_back(block_of(pose));
     add_blocks(model);
@@ -117,17 +91,8 @@ class JointProblem {
   }
 
   FitOutcome solve() {
-    ceres::Solver::Options options;
-    options.max_num_iterations = 1000;
-    // As far as the arithmetic goes: the answer is to be the same whatever the start, and the
-    // valley of focal length and distance is flat.
-    options.function_tolerance = 1e-16;
-    options.gradient_tolerance = 1e-16;
-    options.parameter_tolerance = 1e-13;
+    ceres::Solver::Options options = tight_options();
     options.linear_solver_type = ceres::DENSE_SCHUR;
-    options.dense_linear_algebra_library_type = ceres::EIGEN;  // no BLAS, whichever it would be
-    options.num_threads = 1;
-    options.logging_type = ceres::SILENT;
     options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
     for (PoseBlock& pose : poses_)
       options.linear_solver_ordering->AddElementToGroup(pose.data(), 0);
@@ -145,45 +110,28 @@ class JointProblem {
 
   /// At where the blocks are.
   [[nodiscard]] std::optional<Deviations> deviations() {
-    double cost = 0;
-    problem_.Evaluate({}, &cost, nullptr, nullptr, nullptr);
-    int unknowns = 0;
-    std::vector<double*> blocks;
-    problem_.GetParameterBlocks(&blocks);
-    for (double* block : blocks) unknowns += problem_.ParameterBlockTangentSize(block);
-    const int freedom = problem_.NumResiduals() - unknowns;
-    if (freedom <= 0) return std::nullopt;
-    const double variance = 2 * cost / freedom;
-
-    ceres::Covariance::Options options;
-    options.algorithm_type = ceres::SPARSE_QR;
-    options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;
-    options.num_threads = 1;
-    ceres::Covariance covariance(options);
-    std::vector<std::pair<const double*, const double*>> pairs;
-    for (const double* block : shared_) pairs.emplace_back(block, block);
-    if (!covariance.Compute(pairs, &problem_)) return std::nullopt;
-    const auto deviations_of = [&](const double* block, int size) {
-      std::vector<double> square(static_cast<std::size_t>(size * size), 0);
-      std::vector<double> deviations(static_cast<std::size_t>(size), 0);
-      // In the ambient space, rows of what is fixed are 0.
-      if (!covariance.GetCovarianceBlock(block, block, square.data())) return deviations;
-      for (int i = 0; i < size; ++i)
-        deviations[static_cast<std::size_t>(i)] =
-            std::sqrt(variance * std::max(0.0, square[static_cast<std::size_t>(i * size + i)]));
-      return deviations;
-    };
-    const auto lens_deviations = [&](const LensBlock& lens) {
-      const std::vector<double> d = deviations_of(lens.data(), kLensSize);
-      return LensDeviations{d[0], d[1], d[2], d[3], d[4], d[5], d[6], d[7], d[8]};
+    const std::optional<double> variance = variance_of(problem_);
+    const auto blocks = geometry::deviations_of(problem_, {shared_.begin(), shared_.end()});
+    if (!variance || !blocks) return std::nullopt;
+    const double scale = std::sqrt(*variance);
+    const auto lens_deviations = [&](const std::vector<double>& d) {
+      return LensDeviations{scale * d[0],
+                            scale * d[1],
+                            scale * d[2],
+                            scale * d[3],
+                            scale * d[4],
+                            scale * d[5],
+                            scale * d[6],
+                            scale * d[7],
+                            scale * d[8]};
     };
     Deviations result;
-    result.camera = lens_deviations(camera_);
+    result.camera = lens_deviations(blocks->front());
     if (shared_.size() > 1) {
-      result.projector = lens_deviations(projector_);
-      const std::vector<double> d = deviations_of(rig_.data(), 6);
-      result.rotation_rad = {d[0], d[1], d[2]};
-      result.translation = {d[3], d[4], d[5]};
+      result.projector = lens_deviations((*blocks)[1]);
+      const std::vector<double>& d = (*blocks)[2];
+      result.rotation_rad = scale * Eigen::Vector3d(d[0], d[1], d[2]);
+      result.translation = scale * Eigen::Vector3d(d[3], d[4], d[5]);
     }
     return result;
   }

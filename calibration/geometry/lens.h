@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 
+#include <array>
+
 namespace veneer::geometry {
 
 /// Pinhole with radial and tangential distortion: of a camera, or of a projector, which is a camera
@@ -18,6 +20,10 @@ struct Lens {
   double fx = 0, fy = 0, cx = 0, cy = 0;
   double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
 
+  /// fx, fy, cx, cy, k1, k2, p1, p2, k3.
+  [[nodiscard]] std::array<double, 9> coefficients() const {
+    return {fx, fy, cx, cy, k1, k2, p1, p2, k3};
+  }
   /// The pixel of a point in the lens's frame; NaN for a point not in front (Z <= 0).
   [[nodiscard]] Eigen::Vector2d project(const Eigen::Vector3d& point) const;
 };

@@ -86,7 +86,7 @@ struct BoardRegistrationOptions {
 struct BoardRegistration {
   RigidTransform world_from_projector;
   RigidTransform board_from_sensor;
-  double position_rms_m = 0;  ///< of the inliers: where the board's origin is twice told
+  double position_rms_m = 0;  ///< of the inliers: between the sensor's place as tracked and as seen
   double rotation_rms_rad = 0;
   double held_out_position_m = 0;  ///< root mean square, each inlier predicted by the others
   double held_out_rotation_rad = 0;
