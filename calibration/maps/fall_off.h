@@ -4,21 +4,20 @@
 #include <Eigen/Core>
 
 #include <array>
+#include <cmath>
 #include <cstdint>
-#include <functional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "base/image.h"
 #include "base/result.h"
-#include "base/rigid_transform.h"
 #include "calibration/profile.h"
 
 namespace veneer::calibration {
 
 /// What one camera pixel saw of a matte board that the projector lit all over with one code.
-/// Counts are linear, of one channel or of the sum of several, the same throughout.
+/// Counts are linear, all of one channel.
 struct FallOffSample {
   Eigen::Vector2d projector = Eigen::Vector2d::Zero();  ///< pixel, first centre (0.5, 0.5)
   Eigen::Vector2d camera = Eigen::Vector2d::Zero();     ///< likewise
@@ -29,7 +28,7 @@ struct FallOffSample {
   int pose = 0;                                                   ///< of the board; from 0
 };
 
-/// A camera's own fall-off, of its lens and sensor: exp of a polynomial in the squared distance
+/// A camera's own fall-off, of lens and sensor: exp of a polynomial in the squared distance
 /// from a centre, 1 there.
 struct CameraFallOff {
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();  ///< pixels
@@ -55,11 +54,11 @@ struct FallOffOptions {
   double least_light = 0.05;
   /// Below this cosine of the angle of incidence no board is matte enough. 0.05 to 0.95.
   double least_cosine = 0.3;
-  /// Refused where an error of the samples could be this many times larger in the result than if
-  /// the camera's fall-off were known. Above 1.
-  double most_inflation = 30;
+  /// Most of FallOff::inflation; beyond it there is no result. Boards held all over the raster,
+  /// near and far, reach 1.1 to 1.3; one that stays within millimetres reaches 20. Above 1.
+  double most_inflation = 10;
   /// More samples than this are thinned evenly. 1000 or more.
-  int most_samples = 200000;
+  int most_samples = 50000;
 
   [[nodiscard]] Status check() const;  ///< Errors: kInvalidOption
 };
@@ -79,16 +78,17 @@ struct FallOff {
   std::vector<double> gains;
   /// Relative deviation of counts from the model, root mean square of what is no outlier.
   double residual_rms = 0;
-  /// The same for samples of a pose that the fit did not see, but for its gain; where there is one
-  /// pose only, of a part of the raster.
+  /// The same for samples of a pose that the fit did not see, but for its gain, where other poses
+  /// reach the raster too. With fewer than 4 poses, parts of the raster are left out instead.
   double held_out_rms = 0;
-  /// How many times larger errors of the samples become in `vignetting` since the camera's
-  /// fall-off has to be told from the projector's. 1: not at all.
+  /// How many times larger errors of the samples could become in `vignetting` since the camera's
+  /// fall-off has to be told from the projector's, were that of the highest order. 1: not at all.
   double inflation = 1;
 
   // Samples by what became of them.
-  std::int64_t used = 0;
-  std::int64_t outliers = 0;  ///< among `used`: with no weight left, such as glossy spots
+  std::int64_t used = 0;      ///< before thinning
+  std::int64_t fitted = 0;    ///< after it
+  std::int64_t outliers = 0;  ///< of those fitted: without weight, such as glossy spots
   std::int64_t saturated = 0;
   std::int64_t dark = 0;
   std::int64_t grazing = 0;
@@ -106,35 +106,14 @@ struct FallOff {
 /// spots and stray light do no harm, by Tukey's biweight of their deviation. The board has to move
 /// over the camera's picture relative to the raster (near and far, tilted), or else the two
 /// fall-offs cannot be told apart. Where no sample lies, the value is extrapolated over a short
-/// way, and constant beyond. Deterministic; one thread. Source: the biweight is Beaton and Tukey
-/// 1974, "The Fitting of Power Series, Meaning Polynomials, Illustrated on Band-Spectroscopic
-/// Data", tuned to 4.685 scales as Holland and Welsch 1977, "Robust Regression Using Iteratively
-/// Reweighted Least-Squares", table 1.
+/// way, and constant beyond. Deterministic; one thread.
+/// Source: the biweight is Beaton and Tukey's, with the constant of Holland and Welsch 1977,
+/// "Robust Regression Using Iteratively Reweighted Least-Squares".
 ///
 /// Errors: kInvalidOption (options, the raster); kBadFormat (too few usable samples; the poses
 /// cannot separate the two fall-offs; the text says why and what to do).
 [[nodiscard]] Result<FallOff> measure_fall_off(std::span<const FallOffSample> samples,
                                                const ProjectorGeometry& geometry,
                                                const FallOffOptions& options);
-
-/// The samples of one pose: of every `step`-th pixel of the camera's pictures along both sides that
-/// was decoded. The point is where the ray of the decoded pixel meets the board, so no lens of the
-/// camera is asked for.
-/// @param lit, unlit  the camera's pictures under the code and under black; the channels are
-/// summed.
-/// @param projector  of the pictures' size: projector pixels, NaN where not decoded (checked).
-/// @param projector_from_board  the board is z = 0.
-/// @param is_white  whether a point of the board (x, y, metres) is of its white, with a rim left
-///                  out; empty: all of it.
-/// @param step  1 or more (checked).
-[[nodiscard]] std::vector<FallOffSample> board_samples(
-    ImageView<const Rgb16> lit,
-    ImageView<const Rgb16> unlit,
-    ImageView<const Eigen::Vector2f> projector,
-    const ProjectorGeometry& geometry,
-    const RigidTransform& projector_from_board,
-    const std::function<bool(const Eigen::Vector2d& point)>& is_white,
-    int step,
-    int pose);
 
 }  // namespace veneer::calibration

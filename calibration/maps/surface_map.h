@@ -19,11 +19,9 @@ namespace veneer::calibration {
 /// The camera's pictures of an object that stands still while each primary is shown alone, and
 /// where the light of every camera pixel came from. Borrowed for the call; all of one size.
 struct SurfacePictures {
-  ImageView<const Rgb16> black;
-  /// Each primary alone at full drive. Exposures may differ between them, but black's must be the
-  /// same as each one's: where they differ, give black as grabbed with each.
+  /// Each primary alone at full drive; exposures may differ.
   std::array<ImageView<const Rgb16>, 3> primaries;
-  /// Of a black for each primary, where `black` does not serve all; else empty.
+  /// Black, exposed as each of the above was; three times the same where they were exposed alike.
   std::array<ImageView<const Rgb16>, 3> blacks;
   /// Projector pixels, first centre (0.5, 0.5); NaN where not decoded (geometry::DecodedView).
   ImageView<const Eigen::Vector2f> projector;
