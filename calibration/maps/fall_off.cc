@@ -22,6 +22,8 @@ constexpr float kLeastVignetting = 1e-3F;
 constexpr int kCoverRadius = 2;
 /// How far a polynomial is followed beyond its samples, half diagonals.
 constexpr double kReach = 0.08;
+/// And how far the parabola is that follows, in the logarithm: a factor of 2.
+constexpr double kMostExtrapolated = 0.7;
 /// Fewer samples than this fix no fall-off.
 constexpr std::int64_t kLeastSamples = 200;
 constexpr int kLeastSamplesPerTerm = 10;
@@ -160,8 +162,12 @@ class Sorter {
   const CameraFallOff& camera_;
 };
 
-/// Where texels lie on the raster and which covered one is the nearest.
-void draw_vignetting(const ProjectorGeometry& geometry, const Row& coefficients, FallOff& result) {
+/// @param parabola  coefficients of the lowest order, which is what the fall-off follows far from
+///                  all samples.
+void draw_vignetting(const ProjectorGeometry& geometry,
+                     const Row& coefficients,
+                     const Row& parabola,
+                     FallOff& result) {
   const int width = result.covered.width();
   const int height = result.covered.height();
   const auto centre = [&](int x, int y) {
@@ -173,20 +179,26 @@ void draw_vignetting(const ProjectorGeometry& geometry, const Row& coefficients,
     for (int x = 0; x < width; ++x)
       if (result.covered(x, y) != 0) covered.push_back(centre(x, y));
   const double unit = half_diagonal(geometry.width, geometry.height);
+  const auto value = [&](const Row& of, const Eigen::Vector2d& pixel) {
+    return raster_terms(geometry, pixel).dot(of.head<kRasterTerms>());
+  };
 
   result.vignetting = Image<float>(width, height);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
-      Eigen::Vector2d at = centre(x, y);
+      const Eigen::Vector2d at = centre(x, y);
+      Eigen::Vector2d border = at;  // how far the polynomial is followed
       if (result.covered(x, y) == 0) {
         const Eigen::Vector2d nearest = *std::ranges::min_element(
             covered, {}, [&](const Eigen::Vector2d& other) { return (other - at).squaredNorm(); });
         const double distance = (at - nearest).norm() / unit;
         result.most_extrapolated = std::max(result.most_extrapolated, distance);
-        if (distance > kReach) at = nearest + (at - nearest) * (kReach / distance);
+        if (distance > kReach) border = nearest + (at - nearest) * (kReach / distance);
       }
-      const double log_value = raster_terms(geometry, at).dot(coefficients.head<kRasterTerms>());
-      result.vignetting(x, y) = std::max(static_cast<float>(std::exp(log_value)), kLeastVignetting);
+      const double beyond = std::clamp(
+          value(parabola, at) - value(parabola, border), -kMostExtrapolated, kMostExtrapolated);
+      result.vignetting(x, y) = std::max(
+          static_cast<float>(std::exp(value(coefficients, border) + beyond)), kLeastVignetting);
     }
   result.coverage = static_cast<double>(covered.size()) / (width * height);
 }
@@ -297,7 +309,10 @@ Result<FallOff> measure_fall_off(std::span<const FallOffSample> samples,
   for (int term = 0; term < kCameraTerms; ++term)
     result.camera.coefficients.at(static_cast<std::size_t>(term)) =
         fit.coefficients[kRasterTerms + term];
-  draw_vignetting(geometry, fit.coefficients, result);
+  draw_vignetting(geometry,
+                  fit.coefficients,
+                  solve(fit.moments, {kOrders.front(), choice.model.camera_terms}),
+                  result);
 
   std::vector<RasterTerms> texels;
   for (int y = 0; y < result.covered.height(); ++y)

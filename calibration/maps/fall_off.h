@@ -105,8 +105,8 @@ struct FallOff {
 /// were left out. Samples count by their light (the noise of a photon count) and, so that glossy
 /// spots and stray light do no harm, by Tukey's biweight of their deviation. The board has to move
 /// over the camera's picture relative to the raster (near and far, tilted), or else the two
-/// fall-offs cannot be told apart. Where no sample lies, the value is extrapolated over a short
-/// way, and constant beyond. Deterministic; one thread.
+/// fall-offs cannot be told apart. Where no sample lies, the value is extrapolated: P over a short
+/// way, and from there on as the parabola that fits best goes. Deterministic; one thread.
 /// Source: the biweight is Beaton and Tukey's, with the constant of Holland and Welsch 1977,
 /// "Robust Regression Using Iteratively Reweighted Least-Squares".
 ///

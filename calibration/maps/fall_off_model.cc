@@ -54,27 +54,6 @@ std::vector<std::int64_t> range(std::int64_t begin, std::int64_t end) {
   return all;
 }
 
-/// Coefficients of all columns, 0 where the model does not use one.
-Row solve(const Moments& moments, const Model& model) {
-  const int raster = terms_of(model.order);
-  const int camera = model.camera_terms;
-  Eigen::MatrixXd normal(model.size(), model.size());
-  normal.topLeftCorner(raster, raster) = moments.topLeftCorner(raster, raster);
-  normal.topRightCorner(raster, camera) = moments.block(0, kRasterTerms, raster, camera);
-  normal.bottomLeftCorner(camera, raster) = moments.block(kRasterTerms, 0, camera, raster);
-  normal.bottomRightCorner(camera, camera) =
-      moments.block(kRasterTerms, kRasterTerms, camera, camera);
-  // The second term is for samples that are all alike.
-  normal.diagonal().array() += kRidge * normal.diagonal().mean() + 1e-300;
-  Eigen::VectorXd right(model.size());
-  right << moments.col(kValue).head(raster), moments.col(kValue).segment(kRasterTerms, camera);
-  const Eigen::VectorXd solution = normal.ldlt().solve(right);
-  Row coefficients = Row::Zero();
-  coefficients.head(raster) = solution.head(raster);
-  coefficients.segment(kRasterTerms, camera) = solution.tail(camera);
-  return coefficients;
-}
-
 /// What is left of the moments' values, weighted sum of squares.
 double squares_left(const Moments& moments, Row coefficients) {
   coefficients[kValue] = -1;
@@ -206,6 +185,26 @@ RasterTerms raster_terms(const ProjectorGeometry& geometry, const Eigen::Vector2
     for (std::size_t j = 0; j <= degree; ++j)
       terms[term++] = at_x[degree - j] * at_y[j] - at_centre[degree - j] * at_centre[j];
   return terms;
+}
+
+Row solve(const Moments& moments, const Model& model) {
+  const int raster = terms_of(model.order);
+  const int camera = model.camera_terms;
+  Eigen::MatrixXd normal(model.size(), model.size());
+  normal.topLeftCorner(raster, raster) = moments.topLeftCorner(raster, raster);
+  normal.topRightCorner(raster, camera) = moments.block(0, kRasterTerms, raster, camera);
+  normal.bottomLeftCorner(camera, raster) = moments.block(kRasterTerms, 0, camera, raster);
+  normal.bottomRightCorner(camera, camera) =
+      moments.block(kRasterTerms, kRasterTerms, camera, camera);
+  // The second term is for samples that are all alike.
+  normal.diagonal().array() += kRidge * normal.diagonal().mean() + 1e-300;
+  Eigen::VectorXd right(model.size());
+  right << moments.col(kValue).head(raster), moments.col(kValue).segment(kRasterTerms, camera);
+  const Eigen::VectorXd solution = normal.ldlt().solve(right);
+  Row coefficients = Row::Zero();
+  coefficients.head(raster) = solution.head(raster);
+  coefficients.segment(kRasterTerms, camera) = solution.tail(camera);
+  return coefficients;
 }
 
 Fit fit_robustly(const Data& data, const Model& model) {

@@ -61,6 +61,9 @@ struct Fit {
 /// Robust least squares over all poses.
 [[nodiscard]] Fit fit_robustly(const Data& data, const Model& model);
 
+/// Coefficients of a model by moments of samples, all columns; 0 where it does not use one.
+[[nodiscard]] Row solve(const Moments& moments, const Model& model);
+
 struct Choice {
   Model model;
   double held_out_rms = 0;
