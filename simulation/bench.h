@@ -33,6 +33,7 @@ struct EyeSample {
   float u = 0, v = 0;  ///< barycentric weights of the triangle's second and third corner
   std::int32_t raster_pixel = -1;  ///< row * width + column of what lights it; -1: nothing does
   float geometry = 0;              ///< G, see Bench
+  bool painted = false;            ///< see ObjectTruth::painted
 };
 
 /// Where the rays of an eye's picture end. Made once a pose; what is sent along them is asked for
@@ -105,7 +106,8 @@ struct Comparison {
 /// with theta_p and r the slant and the distance of the lens (a point), primary, black and ambient
 /// the radiance of a perfect diffuser, G = 0 in shadow and off the raster. Raster pixels are boxes:
 /// a point gets the (blurred) light of the pixel whose box its ray leaves through. The surface is
-/// Lambertian and of one albedo, so that summing the bands once, before geometry, is exact. The
+/// Lambertian and of one albedo, or of two where it has a texture, so that summing the bands once
+/// for each, before geometry, is exact. The
 /// lamp is settled, except where a light is asked for with a part of it. Left out: light between
 /// parts of a concave object, light scattered in the lens beyond the blur.
 class Bench {
@@ -150,7 +152,8 @@ class Bench {
   /// alone sends. A hundred-thousandth of `xyz` is taken as rounding, so that the answer holds at
   /// any geometry however small.
   /// @param geometry  >= 0; false for any other, as for an `xyz` that is not finite.
-  [[nodiscard]] bool reachable(const Xyz& xyz, double geometry) const;
+  /// @param painted  part of the surface that has ObjectTruth::texture_reflectance.
+  [[nodiscard]] bool reachable(const Xyz& xyz, double geometry, double painted = 0) const;
 
   /// @param target  what should be received, @param received  what is, both of the view's size.
   /// Errors: kInvalidOption (sizes), kBadFormat (a covered pixel that is not finite), those of
@@ -163,11 +166,17 @@ class Bench {
   /// distance, in the spot of a raster pixel (anywhere on the plane), the whole raster in one code.
   /// The spot is larger than the blur. XYZ in cd/m^2.
   /// @param code  below 2^bits.   @param lamp  in parts of its settled light; 0: it is off.
-  /// @param of_object  the board is of the object's material, else a perfect diffuser.
+  /// @param of_object  the board is of the object's material, not painted, else a perfect diffuser.
   [[nodiscard]] Xyz board(const Rgb16& code,
                           const Eigen::Vector2d& pixel,
                           double lamp,
                           bool of_object) const;
+
+  /// The point of the object that a ray meets first, and what lights it; nothing if it meets none.
+  /// @param direction  any length.
+  [[nodiscard]] std::optional<EyeSample> trace(const RigidTransform& world_from_object,
+                                               const Eigen::Vector3d& origin_in_world,
+                                               const Eigen::Vector3d& direction_in_world) const;
 
   /// Where the middle of what a raster position lights lies on the object, in the world; nothing
   /// where that is past the object. @param pixel  on the raster.

@@ -2,6 +2,7 @@
 #include "simulation/bench.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -45,10 +46,17 @@ Bench::State::State(const BenchTruth& bench_truth, Mesh object)
       on_white(surface_light(projector,
                              planckian_light(truth.room.ambient_kelvin, truth.room.ambient_nits),
                              Spectrum::Ones())),
-      on_object(surface_light(
-          projector,
-          planckian_light(truth.room.ambient_kelvin, truth.room.ambient_nits),
-          interpolated_spectrum(truth.object.wavelength_nm, truth.object.reflectance))) {}
+      on_object{
+          surface_light(
+              projector,
+              planckian_light(truth.room.ambient_kelvin, truth.room.ambient_nits),
+              interpolated_spectrum(truth.object.wavelength_nm, truth.object.reflectance)),
+          surface_light(projector,
+                        planckian_light(truth.room.ambient_kelvin, truth.room.ambient_nits),
+                        interpolated_spectrum(truth.object.wavelength_nm,
+                                              truth.object.texture == ObjectTruth::Texture::kNone
+                                                  ? truth.object.reflectance
+                                                  : truth.object.texture_reflectance))} {}
 
 /// Which raster pixel lights a surface point, and how strongly.
 EyeSample Bench::State::light(const MeshPoint& point,
@@ -56,6 +64,7 @@ EyeSample Bench::State::light(const MeshPoint& point,
                               const Eigen::Vector3d& lens_in_object) const {
   EyeSample sample{point.triangle, point.u, point.v};
   const SurfacePoint surface = mesh.at(point);
+  sample.painted = truth.object.painted(surface.uv);
   const Eigen::Vector3d to_lens = lens_in_object - surface.position;
   const double distance = to_lens.norm();
   const double cosine = surface.normal.dot(to_lens) / distance;
@@ -155,20 +164,29 @@ Result<EyeView> Bench::look(const RigidTransform& world_from_object,
 Result<Image<Rgb32f>> Bench::observe(const EyeView& view, ImageView<const Rgb16> codes) const {
   VENEER_ASSIGN(const Image<VirtualProjector::Light> light, state_->projector.project(codes));
   Image<Rgb32f> picture(view.width(), view.height(), Rgb32f::Zero());
-  const SurfaceLight& surface = state_->on_object;
-  for (std::size_t pixel = 0; pixel + 1 < view.first.size(); ++pixel) {
+  // What lights a pixel's parts that are not painted, and those that are.
+  struct Lit {
     VirtualProjector::Outputs output = VirtualProjector::Outputs::Zero();
     double geometry = 0;
+    int rays = 0;
+  };
+  for (std::size_t pixel = 0; pixel + 1 < view.first.size(); ++pixel) {
+    std::array<Lit, 2> parts;
     for (std::uint32_t i = view.first[pixel]; i < view.first[pixel + 1]; ++i) {
       const EyeSample& sample = view.samples[i];
+      Lit& part = parts[sample.painted ? 1 : 0];
+      ++part.rays;
       if (sample.raster_pixel < 0) continue;
-      output += sample.geometry *
-                light.pixels()[static_cast<std::size_t>(sample.raster_pixel)].cast<double>();
-      geometry += sample.geometry;
+      part.output += sample.geometry *
+                     light.pixels()[static_cast<std::size_t>(sample.raster_pixel)].cast<double>();
+      part.geometry += sample.geometry;
     }
-    const double on_object = view.first[pixel + 1] - view.first[pixel];
-    const Xyz sum =
-        surface.outputs * output + geometry * surface.black + on_object * surface.ambient;
+    Xyz sum = Xyz::Zero();
+    for (std::size_t i = 0; i < 2; ++i) {
+      const SurfaceLight& surface = state_->on_object[i];
+      sum += surface.outputs * parts[i].output + parts[i].geometry * surface.black +
+             parts[i].rays * surface.ambient;
+    }
     picture.pixels()[pixel] = (sum / view.rays_per_pixel).cast<float>();
   }
   return picture;
@@ -235,7 +253,7 @@ Xyz Bench::board(const Rgb16& code,
                  const Eigen::Vector2d& pixel,
                  double lamp,
                  bool of_object) const {
-  const SurfaceLight& surface = of_object ? state_->on_object : state_->on_white;
+  const SurfaceLight& surface = of_object ? state_->on_object[0] : state_->on_white;
   const VirtualProjector& projector = state_->projector;
   const double cosine = projector.axis_cosine(pixel);
   const double distance = state_->truth.projector.reference_distance_m / cosine;
@@ -243,6 +261,17 @@ Xyz Bench::board(const Rgb16& code,
   const double geometry = cosine * fall_off * projector.vignetting(pixel);
   return lamp * geometry * (surface.outputs * projector.output(code) + surface.black) +
          surface.ambient;
+}
+
+std::optional<EyeSample> Bench::trace(const RigidTransform& world_from_object,
+                                      const Eigen::Vector3d& origin_in_world,
+                                      const Eigen::Vector3d& direction_in_world) const {
+  const RigidTransform object_from_world = world_from_object.inverse();
+  const auto hit = state_->mesh.trace(object_from_world * origin_in_world,
+                                      object_from_world.rotation * direction_in_world);
+  if (!hit) return std::nullopt;
+  const Eigen::Vector3d& lens = state_->truth.projector.world_from_projector.translation;
+  return state_->light(*hit, world_from_object, object_from_world * lens);
 }
 
 std::optional<Eigen::Vector3d> Bench::lit_point(const RigidTransform& world_from_object,

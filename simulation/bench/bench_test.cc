@@ -336,6 +336,66 @@ TEST(Bench, APixelIsCoveredHoweverLittleLightItGets) {
   EXPECT_GT(on_edge_of_raster, 10);
 }
 
+TEST(Bench, ATexturedSurfaceSendsInEachFieldWhatASurfaceOfThatReflectanceDoes) {
+  BenchTruth truth = plain_truth();
+  truth.projector.black_fraction = 0.002;
+  truth.room.ambient_nits = 2;
+  truth.object.wavelength_nm = {450, 650};
+  truth.object.reflectance = {0.8, 0.4};
+  BenchTruth other = truth;
+  other.object.reflectance = {0.2, 0.5};
+  BenchTruth both = truth;
+  both.object.texture = ObjectTruth::Texture::kChecks;
+  both.object.texture_fields = 9;
+  both.object.texture_reflectance = other.object.reflectance;
+  const auto bare = make_bench(truth, square(0.3));
+  const auto painted = make_bench(other, square(0.3));
+  const auto checks = make_bench(both, square(0.3));
+  const Rgb16 code{200, 90, 140};
+  const auto picture = [&](const Bench& bench) {
+    return observe(bench, look(bench, {}, {0.2, 0.1, 1}), code);
+  };
+  const Image<Rgb32f> of_bare = picture(*bare);
+  const Image<Rgb32f> of_painted = picture(*painted);
+  const Image<Rgb32f> of_checks = picture(*checks);
+  const EyeView view = look(*checks, {}, {0.2, 0.1, 1});
+  std::array<int, 3> seen{};  // bare, painted, an edge
+  for (std::size_t pixel = 0; pixel + 1 < view.first.size(); ++pixel) {
+    int paint = 0;
+    const int rays = static_cast<int>(view.first[pixel + 1] - view.first[pixel]);
+    for (std::uint32_t i = view.first[pixel]; i < view.first[pixel + 1]; ++i)
+      paint += view.samples[i].painted ? 1 : 0;
+    const Rgb32f got = of_checks.pixels()[pixel];
+    const Rgb32f at_bare = of_bare.pixels()[pixel];
+    const Rgb32f at_painted = of_painted.pixels()[pixel];
+    if (rays == 0) continue;
+    if (paint == 0) {
+      ++seen[0];
+      EXPECT_EQ(got, at_bare) << pixel;
+    } else if (paint == rays) {
+      ++seen[1];
+      EXPECT_EQ(got, at_painted) << pixel;
+    } else {
+      ++seen[2];
+      EXPECT_TRUE((got.array() >= at_bare.cwiseMin(at_painted).array() * 0.99F).all()) << pixel;
+      EXPECT_TRUE((got.array() <= at_bare.cwiseMax(at_painted).array() * 1.01F).all()) << pixel;
+    }
+  }
+  EXPECT_GT(*std::ranges::min_element(seen), 50);
+
+  // What it sends is in reach of it, on edges too, and is not so if it is of one reflectance alone.
+  auto compared = checks->compare(view, of_checks, of_checks);
+  ASSERT_TRUE(compared) << compared.error().what;
+  EXPECT_EQ(compared->in_gamut_fraction, 1.0);
+  const Image<Rgb32f> white = observe(*bare, look(*bare, {}, {0.2, 0.1, 1}), kFull);
+  compared = checks->compare(view, white, white);
+  ASSERT_TRUE(compared) << compared.error().what;
+  EXPECT_NEAR(compared->in_gamut_fraction, 0.5, 0.25);
+  EXPECT_TRUE(checks->reachable(painted->board(kFull, {32, 24}, 1, true), 1, 1));
+  EXPECT_FALSE(checks->reachable(bare->board(kFull, {32, 24}, 1, true), 1, 1));
+  EXPECT_TRUE(checks->reachable(bare->board(kFull, {32, 24}, 1, true), 1, 0));
+}
+
 TEST(Bench, RefusesPosesThatMakeNoPicture) {
   const auto bench = make_bench(plain_truth(), square(0.1));
   RigidTransform broken;

@@ -36,22 +36,6 @@ double square_wave(double x, double width) {
   return (integral(x + 0.5 * width) - integral(x - 0.5 * width)) / width;
 }
 
-/// Where the rays of a pixel go through, from its corner: a pixel and a lens that blurs by a
-/// pixel's width make a tent. A lattice in which no two rays share a column or a row, so that an
-/// edge along either is met as finely as the rays are many.
-std::vector<Eigen::Vector2d> ray_places(int rays) {
-  int stride = std::max(1, static_cast<int>(std::lround(rays / std::numbers::phi)));
-  while (std::gcd(stride, rays) != 1) --stride;
-  // The integral of the tent turned round.
-  const auto place = [rays](int i) {
-    const double part = (i + 0.5) / rays;
-    return part < 0.5 ? std::sqrt(2 * part) - 0.5 : 1.5 - std::sqrt(2 * (1 - part));
-  };
-  std::vector<Eigen::Vector2d> places;
-  for (int i = 0; i < rays; ++i) places.emplace_back(place(i), place(i * stride % rays));
-  return places;
-}
-
 /// Half the sides of a board with its border, and its middle.
 std::pair<Eigen::Vector2d, Eigen::Vector2d> extent(const BoardTruth& board) {
   const Eigen::Vector2d squares(board.columns + 1, board.rows + 1);
@@ -122,6 +106,23 @@ Eigen::Vector2d RadialDistortion::undistorted(const Eigen::Vector2d& slope) cons
   const int below = std::min(static_cast<int>(at), kTableSteps - 1);
   const auto i = static_cast<std::size_t>(below);
   return slope * std::lerp(factors_[i], factors_[i + 1], at - below);
+}
+
+RadialDistortion distortion_of(const CameraTruth& camera) {
+  return {camera.k1, camera.k2, 1.5 * most_slope(camera)};
+}
+
+std::vector<Eigen::Vector2d> ray_places(int rays) {
+  int stride = std::max(1, static_cast<int>(std::lround(rays / std::numbers::phi)));
+  while (std::gcd(stride, rays) != 1) --stride;
+  // The integral of the tent turned round.
+  const auto place = [rays](int i) {
+    const double part = (i + 0.5) / rays;
+    return part < 0.5 ? std::sqrt(2 * part) - 0.5 : 1.5 - std::sqrt(2 * (1 - part));
+  };
+  std::vector<Eigen::Vector2d> places;
+  for (int i = 0; i < rays; ++i) places.emplace_back(place(i), place(i * stride % rays));
+  return places;
 }
 
 Eigen::Vector3d board_corner(const BoardTruth& board, int column, int row) {
@@ -206,7 +207,7 @@ BoardView::BoardView(const BoardTruth& board,
                      const ProjectorTruth& projector_truth,
                      const RigidTransform& world_from_board)
     : width_(camera.width), height_(camera.height) {
-  const RadialDistortion lens(camera.k1, camera.k2, 1.5 * most_slope(camera));
+  const RadialDistortion lens = distortion_of(camera);
   const RigidTransform board_from_camera = world_from_board.inverse() * camera.world_from_camera;
   const Eigen::Matrix3d board_rotation = board_from_camera.rotation.toRotationMatrix();
   const Eigen::Vector3d projector_in_board =

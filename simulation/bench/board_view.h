@@ -32,6 +32,14 @@ class RadialDistortion {
   std::vector<double> factors_;  // slope / distorted slope, at equal steps of the latter's square
 };
 
+/// Of a camera's lens, wide enough for its picture.
+[[nodiscard]] RadialDistortion distortion_of(const CameraTruth& camera);
+
+/// Where the rays of a pixel go through, from its corner: a pixel and a lens that blurs by a
+/// pixel's width make a tent. A lattice in which no two rays share a column or a row, so that an
+/// edge along either is met as finely as the rays are many.
+[[nodiscard]] std::vector<Eigen::Vector2d> ray_places(int rays);
+
 /// Where the board's inner corner (column, row) stands in the board's frame; (-1, -1) is the outer
 /// corner of the squares, whose square is black.
 [[nodiscard]] Eigen::Vector3d board_corner(const BoardTruth& board, int column, int row);

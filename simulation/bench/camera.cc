@@ -70,13 +70,25 @@ VirtualCamera::VirtualCamera(const Bench& bench,
       board_(*bench.truth().board),
       projector_(bench.truth().projector),
       poses_(std::move(poses)),
-      seen_black_(seen(projector_.black())),
-      seen_ambient_(seen(
-          planckian_light(bench.truth().room.ambient_kelvin, bench.truth().room.ambient_nits))),
       exposure_s_(std::clamp(kFirstExposure_s, truth_.least_exposure_s, truth_.most_exposure_s)),
       deviates_(normal_deviates(truth_.seed)) {
+  const ObjectTruth& object = bench.truth().object;
+  on_white_ = seen_on(Spectrum::Ones());
+  on_object_[0] = seen_on(interpolated_spectrum(object.wavelength_nm, object.reflectance));
+  on_object_[1] = on_object_[0];
+  if (object.texture != ObjectTruth::Texture::kNone)
+    on_object_[1] =
+        seen_on(interpolated_spectrum(object.wavelength_nm, object.texture_reflectance));
+}
+
+VirtualCamera::SeenLight VirtualCamera::seen_on(const Spectrum& reflectance) const {
+  const RoomTruth& room = bench_.truth().room;
+  SeenLight light;
   for (int i = 0; i < VirtualProjector::kOutputs; ++i)
-    seen_outputs_.col(i) = seen(projector_.primaries()[static_cast<std::size_t>(i)]);
+    light.outputs.col(i) = seen(reflectance * projector_.primaries()[static_cast<std::size_t>(i)]);
+  light.black = seen(reflectance * projector_.black());
+  light.ambient = seen(reflectance * planckian_light(room.ambient_kelvin, room.ambient_nits));
+  return light;
 }
 
 Status VirtualCamera::set_exposure(double seconds) {
@@ -96,23 +108,30 @@ Status VirtualCamera::place_board(int pose) {
                 "placing the board on the bench: there is no pose {}; there are 0 to {}",
                 pose,
                 poses_.size() - 1);
-  view_.emplace(
-      board_, truth_, projector_, bench_.truth().projector, poses_[static_cast<std::size_t>(pose)]);
+  place_board(poses_[static_cast<std::size_t>(pose)]);
   return {};
+}
+
+void VirtualCamera::place_board(const RigidTransform& world_from_board) {
+  view_.emplace(board_, truth_, projector_, bench_.truth().projector, world_from_board);
 }
 
 void VirtualCamera::remove_board() { view_.reset(); }
 
-Status VirtualCamera::light_raster() {
-  if (!raster_.empty() && lit_picture_ == display_.shown()) return {};
+void VirtualCamera::place_object(const RigidTransform& world_from_object) {
+  object_.emplace(bench_, truth_, world_from_object);
+}
+
+Status VirtualCamera::light_raster(SeenLight& light) const {
+  if (!light.raster.empty() && light.lit_picture == display_.shown()) return {};
   const ProjectorTruth& projector = bench_.truth().projector;
   const Image<Rgb16> patch(projector.width, projector.height, display_.code());
   const bool picture = !display_.picture().empty();
   VENEER_ASSIGN(
-      raster_,
-      projector_.project(picture ? display_.picture().view() : patch.view(), seen_outputs_));
-  for (Rgb32f& light : raster_.pixels()) light += seen_black_;
-  lit_picture_ = display_.shown();
+      light.raster,
+      projector_.project(picture ? display_.picture().view() : patch.view(), light.outputs));
+  for (Rgb32f& pixel : light.raster.pixels()) pixel += light.black;
+  light.lit_picture = display_.shown();
   return {};
 }
 
@@ -123,10 +142,20 @@ Result<capture::CameraFrame> VirtualCamera::grab() {
   frame.full_scale = static_cast<std::uint16_t>((1U << static_cast<unsigned>(truth_.bits)) - 1);
   frame.exposure_s = exposure_s_;
   frame.time = display_.now() - from_seconds(0.5 * exposure_s_);
-  Image<Rgb32f> light(truth_.width, truth_.height);  // black where there is no board
+  Image<Rgb32f> light(truth_.width, truth_.height);  // black where nothing stands
+  const auto lamp = static_cast<float>(display_.lamp());
   if (view_) {
-    VENEER_TRY(light_raster());
-    light = view_->gather(raster_, static_cast<float>(display_.lamp()), seen_ambient_);
+    VENEER_TRY(light_raster(on_white_));
+    light = view_->gather(on_white_.raster, lamp, on_white_.ambient);
+  } else if (object_) {
+    ObjectView::OnObject<Image<Rgb32f>> rasters;
+    ObjectView::OnObject<Rgb32f> ambient;
+    for (std::size_t side = 0; side < 2; ++side) {
+      VENEER_TRY(light_raster(on_object_[side]));
+      rasters[side] = on_object_[side].raster;
+      ambient[side] = on_object_[side].ambient;
+    }
+    light = object_->gather(rasters, lamp, ambient);
   }
 
   const auto electrons_per_light = static_cast<float>(truth_.sensitivity * exposure_s_);

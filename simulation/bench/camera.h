@@ -13,13 +13,16 @@
 #include "simulation/bench.h"
 #include "simulation/bench/board_view.h"
 #include "simulation/bench/colorimeter.h"
+#include "simulation/bench/object_view.h"
+#include "simulation/bench/projector.h"
+#include "simulation/bench/spectrum.h"
 
 namespace veneer::simulation {
 
-/// The bench's camera: it sees the board, lit by what the display shows and by the ambient light;
-/// around the board is black. Counts are cut at 0 and at full scale; there is no offset. The same
-/// pictures for the same seed. A grab passes 0.1 s of the bench's time, or the exposure where that
-/// is longer.
+/// The bench's camera: it sees the board or the object, lit by what the display shows and by the
+/// ambient light; around it is black. Counts are cut at 0 and at full scale; there is no offset.
+/// The same pictures for the same seed. A grab passes 0.1 s of the bench's time, or the exposure
+/// where that is longer.
 class VirtualCamera final : public capture::Camera {
  public:
   /// @param bench, display  borrowed; must outlive the camera.
@@ -38,14 +41,18 @@ class VirtualCamera final : public capture::Camera {
   const std::vector<RigidTransform>& board_poses() const&& = delete;
   /// Errors: kInvalidOption (no such pose).
   [[nodiscard]] Status place_board(int pose);
+  /// The board anywhere, as a hand may hold it; seen where the camera's picture reaches.
+  /// @param world_from_board  finite; the board in front of the camera.
+  void place_board(const RigidTransform& world_from_board);
   void remove_board();
+  /// The object, which is seen while no board is in the way; none stands there at first.
+  void place_object(const RigidTransform& world_from_object);
 
  private:
   static constexpr double kFirstExposure_s = 0.005;
   VirtualCamera(const Bench& bench,
                 VirtualPatchDisplay& display,
                 std::vector<RigidTransform> poses);
-  [[nodiscard]] Status light_raster();
 
   const Bench& bench_;
   VirtualPatchDisplay& display_;
@@ -54,11 +61,19 @@ class VirtualCamera final : public capture::Camera {
   VirtualProjector projector_;
   std::vector<RigidTransform> poses_;
   std::optional<BoardView> view_;
-  Eigen::Matrix<float, 3, VirtualProjector::kOutputs> seen_outputs_;  // by the camera's channels
-  Rgb32f seen_black_;
-  Rgb32f seen_ambient_;
-  std::uint64_t lit_picture_ = 0;  // the display's picture that raster_ is of
-  Image<Rgb32f> raster_;           // as the camera's channels see it, lamp settled
+  std::optional<ObjectView> object_;
+  /// Of one surface, as the camera's channels see it.
+  struct SeenLight {
+    Eigen::Matrix<float, 3, VirtualProjector::kOutputs> outputs;
+    Rgb32f black;
+    Rgb32f ambient;
+    std::uint64_t lit_picture = 0;  // the display's picture that raster is of
+    Image<Rgb32f> raster;           // lamp settled
+  };
+  [[nodiscard]] Status light_raster(SeenLight& light) const;
+  [[nodiscard]] SeenLight seen_on(const Spectrum& reflectance) const;
+  SeenLight on_white_;
+  ObjectView::OnObject<SeenLight> on_object_;
   double exposure_s_;
   std::uint64_t grabs_ = 0;
   std::vector<float> deviates_;  // a table of normal ones

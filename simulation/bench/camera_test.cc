@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "base/statistics.h"
 #include "simulation/bench/testing.h"
@@ -215,6 +216,56 @@ TEST(VirtualCamera, RefusesWhatItCannotDo) {
   const auto camera = VirtualCamera::create(**bench, display);
   ASSERT_FALSE(camera);
   EXPECT_THAT(camera.error().what, HasSubstr("[camera]"));
+}
+
+TEST(VirtualCamera, SeesTheObjectAsItSeesABoardOfItsMaterialInItsPlace) {
+  BenchTruth truth = even_truth();
+  truth.object.reflectance = {truth.board->white};
+  const CameraOnBench on_bench(truth);
+  ASSERT_TRUE(on_bench.camera->set_exposure(0.002));
+  // Both square to the axis at the world's origin; the object is the larger one.
+  const BoardTruth& board = *truth.board;
+  on_bench.camera->place_board(
+      {Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitX())),
+       {-0.5 * (board.columns - 1) * board.square_m, 0.5 * (board.rows - 1) * board.square_m, 0}});
+  const Image<Rgb16> of_board = on_bench.grab().counts;
+  on_bench.camera->place_object({});
+  EXPECT_NE(on_bench.grab().counts(160, 120), Rgb16{}) << "the board is in the way";
+  on_bench.camera->remove_board();
+  const Image<Rgb16> of_object = on_bench.grab().counts;
+  int compared = 0;
+  for (int y = 100; y < 140; ++y)
+    for (int x = 140; x < 180; ++x)
+      for (std::size_t c = 0; c < 3; ++c) {
+        ASSERT_GT(of_board(x, y)[c], 1000);
+        // Shot noise of some 100 000 electrons in both, five times over.
+        EXPECT_NEAR(of_object(x, y)[c], of_board(x, y)[c], 0.025 * of_board(x, y)[c]);
+        ++compared;
+      }
+  EXPECT_EQ(compared, 3 * 40 * 40);
+}
+
+TEST(VirtualCamera, SeesPaintDarkerByItsReflectance) {
+  BenchTruth truth = even_truth();
+  truth.object.reflectance = {0.8};
+  truth.object.texture = ObjectTruth::Texture::kStripes;
+  truth.object.texture_fields = 2;  // the right half of the plate
+  truth.object.texture_reflectance = {0.2};
+  const CameraOnBench on_bench(truth);
+  ASSERT_TRUE(on_bench.camera->set_exposure(0.002));
+  on_bench.camera->remove_board();
+  on_bench.camera->place_object({});
+  const Image<Rgb16> picture = on_bench.grab().counts;
+  const auto mean_about = [&](const Eigen::Vector3d& point) {
+    const Eigen::Vector2d at = camera_pixel(*truth.camera, point);
+    double sum = 0;
+    for (int y = -3; y <= 3; ++y)
+      for (int x = -3; x <= 3; ++x)
+        sum += picture(static_cast<int>(at.x()) + x, static_cast<int>(at.y()) + y)[1];
+    return sum / 49;
+  };
+  // Alike in the projector's light, left and right of its axis.
+  EXPECT_NEAR(mean_about({0.04, 0, 0}) / mean_about({-0.04, 0, 0}), 0.25, 0.005);
 }
 
 }  // namespace

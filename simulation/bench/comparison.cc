@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -21,6 +22,37 @@ double mean_geometry(const EyeView& view, std::size_t pixel) {
   for (std::uint32_t i = view.first[pixel]; i < view.first[pixel + 1]; ++i)
     sum += view.samples[i].geometry;
   return sum / view.rays_per_pixel;
+}
+
+/// @param painted_lit, painted_seen  part of `painted` in the projector's light and in the ambient.
+SurfaceLight mixed(const SurfaceLight& bare,
+                   const SurfaceLight& painted,
+                   double painted_lit,
+                   double painted_seen) {
+  return {(1 - painted_lit) * bare.outputs + painted_lit * painted.outputs,
+          (1 - painted_lit) * bare.black + painted_lit * painted.black,
+          (1 - painted_seen) * bare.ambient + painted_seen * painted.ambient};
+}
+
+/// What a pixel sees of a surface of two reflectances.
+SurfaceLight mean_surface(const EyeView& view,
+                          std::size_t pixel,
+                          const std::array<SurfaceLight, 2>& on_object) {
+  double geometry = 0;
+  double painted_geometry = 0;
+  double painted_rays = 0;
+  for (std::uint32_t i = view.first[pixel]; i < view.first[pixel + 1]; ++i) {
+    const EyeSample& sample = view.samples[i];
+    geometry += sample.geometry;
+    if (!sample.painted) continue;
+    painted_geometry += sample.geometry;
+    ++painted_rays;
+  }
+  const double rays = view.first[pixel + 1] - view.first[pixel];
+  return mixed(on_object[0],
+               on_object[1],
+               geometry > 0 ? painted_geometry / geometry : 0.0,
+               rays > 0 ? painted_rays / rays : 0.0);
 }
 
 }  // namespace
@@ -46,10 +78,9 @@ Result<Xyz> Bench::white(const RigidTransform& world_from_object) const {
              (white.outputs * state_->projector.output({full, full, full}) + white.black));
 }
 
-bool Bench::reachable(const Xyz& xyz, double geometry) const {
+bool Bench::State::reachable(const SurfaceLight& surface, const Xyz& xyz, double geometry) const {
   if (!(geometry >= 0) || !xyz.allFinite()) return false;
   constexpr double kRounding = 1e-5;  // of pictures kept in 32-bit floats, with room to spare
-  const SurfaceLight& surface = state_->on_object;
   const double tolerance = kRounding * xyz.cwiseAbs().maxCoeff();
   // Held against the light, not the drive: where G is small, a rounding of xyz is any drive.
   const auto sends = [&](const VirtualProjector::Outputs& output) {
@@ -60,8 +91,12 @@ bool Bench::reachable(const Xyz& xyz, double geometry) const {
   if (sends(VirtualProjector::Outputs::Zero())) return true;
   if (geometry == 0) return false;
   const Xyz from_channels = (xyz - surface.ambient) / geometry - surface.black;
-  const VirtualProjector& projector = state_->projector;
   return sends(projector.interact(projector.drive_towards(surface.outputs, from_channels)));
+}
+
+bool Bench::reachable(const Xyz& xyz, double geometry, double painted) const {
+  const auto& [bare, paint] = state_->on_object;
+  return state_->reachable(mixed(bare, paint, painted, painted), xyz, geometry);
 }
 
 Result<Comparison> Bench::compare(const EyeView& view,
@@ -101,7 +136,9 @@ Result<Comparison> Bench::compare(const EyeView& view,
     covered.push_back(de00);
     if (wanted_lab.l > 100) ++c.target_over_white;
     if (got_lab.l > 100) ++c.received_over_white;
-    if (!reachable(wanted, mean_geometry(view, pixel))) continue;
+    if (!state_->reachable(
+            mean_surface(view, pixel, state_->on_object), wanted, mean_geometry(view, pixel)))
+      continue;
     c.in_gamut.pixels()[pixel] = 1;
     within_gamut.push_back(de00);
   }

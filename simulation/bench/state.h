@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 
+#include <array>
+
 #include "simulation/bench.h"
 #include "simulation/bench/projector.h"
 #include "simulation/bench/traced_mesh.h"
@@ -22,12 +24,15 @@ struct Bench::State {
   VirtualProjector projector;
   TracedMesh mesh;
   SurfaceLight on_white;  // a perfect diffuser
-  SurfaceLight on_object;
+  /// Of the object's reflectance and of what is painted on it; without a texture twice the same.
+  std::array<SurfaceLight, 2> on_object;
 
   State(const BenchTruth& bench_truth, Mesh object);
   [[nodiscard]] EyeSample light(const MeshPoint& point,
                                 const RigidTransform& world_from_object,
                                 const Eigen::Vector3d& lens_in_object) const;
+  /// See Bench::reachable.
+  [[nodiscard]] bool reachable(const SurfaceLight& surface, const Xyz& xyz, double geometry) const;
 };
 
 }  // namespace veneer::simulation

@@ -39,6 +39,20 @@ Eigen::Quaterniond turned_by(const Eigen::Vector3d& turn_rad) {
   return Eigen::Quaterniond(Eigen::AngleAxisd(angle, turn_rad / angle));
 }
 
+void read_texture(TomlReader& toml, ObjectTruth& object) {
+  std::string name = "none";
+  toml.read("texture", name);
+  if (name == "none") return;
+  if (name == "checks")
+    object.texture = ObjectTruth::Texture::kChecks;
+  else if (name == "stripes")
+    object.texture = ObjectTruth::Texture::kStripes;
+  else
+    toml.add_error("texture", "must be \"none\", \"checks\" or \"stripes\"");
+  toml.read("texture_fields", object.texture_fields);
+  toml.require("texture_reflectance", object.texture_reflectance);
+}
+
 /// Where a device stands and which way it looks.
 RigidTransform read_aim(TomlReader& toml) {
   Eigen::Vector3d position = Eigen::Vector3d::UnitZ();
@@ -207,7 +221,16 @@ Status check_object(const ObjectTruth& object) {
   if (std::ranges::adjacent_find(object.wavelength_nm, std::ranges::greater_equal{}) !=
       object.wavelength_nm.end())
     return fail(Errc::kInvalidOption, "object.wavelength_nm does not rise");
-  return {};
+  const std::size_t wanted =
+      object.texture == ObjectTruth::Texture::kNone ? 0 : object.wavelength_nm.size();
+  if (object.texture_reflectance.size() != wanted)
+    return fail(Errc::kInvalidOption,
+                "object.texture_reflectance has {} values; with this texture it needs {}",
+                object.texture_reflectance.size(),
+                wanted);
+  for (const double reflectance : object.texture_reflectance)
+    VENEER_TRY(in_range("object.texture_reflectance", reflectance, 1e-3, 1));
+  return in_range("object.texture_fields", object.texture_fields, 1, 1000);
 }
 
 Status check_instrument(const InstrumentTruth& i) {
@@ -268,6 +291,13 @@ Status check_board(const BoardTruth& b) {
 
 }  // namespace
 
+bool ObjectTruth::painted(const Eigen::Vector2d& uv) const {
+  if (texture == Texture::kNone) return false;
+  double field = std::floor(uv.x() * texture_fields);
+  if (texture == Texture::kChecks) field += std::floor(uv.y() * texture_fields);
+  return std::fmod(std::abs(field), 2.0) == 1.0;
+}
+
 Status BenchTruth::check() const {
   VENEER_TRY(check_projector(projector));
   VENEER_TRY(check_object(object));
@@ -295,6 +325,7 @@ Result<BenchTruth> BenchTruth::load(const std::filesystem::path& path) {
   object.require("mesh", truth.object.mesh);
   object.require("wavelength_nm", truth.object.wavelength_nm);
   object.require("reflectance", truth.object.reflectance);
+  read_texture(object, truth.object);
   // A name without an extension is a built-in mesh.
   if (std::filesystem::path(truth.object.mesh).has_extension())
     truth.object.mesh = (toml.folder() / truth.object.mesh).string();

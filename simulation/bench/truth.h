@@ -72,6 +72,19 @@ struct ObjectTruth {
   std::string mesh = "sphere";  ///< built-in name or file
   std::vector<double> wavelength_nm{550};
   std::vector<double> reflectance{0.8};  ///< of the Lambertian surface, at those wavelengths
+  /// What is painted on it, over uv: fields of `reflectance`, which has the one at uv = 0, and of
+  /// `texture_reflectance` by turns.
+  enum class Texture {
+    kNone,
+    kChecks,
+    kStripes,  ///< along v
+  };
+  Texture texture = Texture::kNone;
+  double texture_fields = 8;                ///< along u, and of checks along v. 1 to 1000.
+  std::vector<double> texture_reflectance;  ///< one for each wavelength; empty without a texture
+
+  /// Whether a point of the surface has `texture_reflectance`.
+  [[nodiscard]] bool painted(const Eigen::Vector2d& uv) const;
 };
 
 struct RoomTruth {

@@ -156,6 +156,9 @@ TEST(BenchTruth, EveryRangeIsChecked) {
       [](BenchTruth& t) { t.projector.channels[2].exponent = 0; },
       [](BenchTruth& t) { t.object.reflectance = {1.1}; },
       [](BenchTruth& t) { t.object.wavelength_nm.clear(); },
+      [](BenchTruth& t) { t.object.texture_reflectance = {0.5}; },
+      [](BenchTruth& t) { t.object.texture = ObjectTruth::Texture::kChecks; },
+      [](BenchTruth& t) { t.object.texture_fields = 0; },
       [](BenchTruth& t) { t.room.ambient_kelvin = 0; },
       [](BenchTruth& t) { t.eye.vertical_fov_deg = 180; },
   };
@@ -168,6 +171,20 @@ TEST(BenchTruth, EveryRangeIsChecked) {
     mistakes[i](truth);
     EXPECT_FALSE(truth.check()) << "mistake " << i;
   }
+}
+
+TEST(ObjectTexture, AlternatesFromFieldToFieldAndIsNoneByDefault) {
+  ObjectTruth object;
+  EXPECT_FALSE(object.painted({0.3, 0.3}));
+  object.texture_fields = 4;
+  for (int y = -3; y < 4; ++y)
+    for (int x = -3; x < 4; ++x) {
+      const Eigen::Vector2d uv((x + 0.5) / 4, (y + 0.5) / 4);
+      object.texture = ObjectTruth::Texture::kChecks;
+      EXPECT_EQ(object.painted(uv), (x + y) % 2 != 0) << uv.transpose();
+      object.texture = ObjectTruth::Texture::kStripes;
+      EXPECT_EQ(object.painted(uv), x % 2 != 0) << uv.transpose();
+    }
 }
 
 }  // namespace
