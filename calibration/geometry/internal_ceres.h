@@ -2,6 +2,7 @@
 #pragma once
 
 #include <ceres/ceres.h>
+#include <glog/logging.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +14,8 @@ namespace veneer::geometry {
 /// To the end of the arithmetic, on one thread and without a BLAS, whichever it would be: the
 /// answer is to be the same whatever the start and the machine.
 [[nodiscard]] inline ceres::Solver::Options tight_options() {
+  // What a solver makes of a hopeless start is told by its summary, not on standard error.
+  FLAGS_minloglevel = google::GLOG_FATAL;
   ceres::Solver::Options options;
   options.max_num_iterations = 1000;
   options.function_tolerance = 1e-16;
