@@ -5,10 +5,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
-#include "calibration/interpolation.h"
+#include "calibration/colour/baking.h"
+#include "calibration/colour/colour_patches.h"
+#include "calibration/internal_reading_session.h"
+#include "calibration/spot_fall_off.h"
 
 namespace veneer::calibration {
 namespace {
@@ -18,76 +23,22 @@ constexpr std::array<std::string_view, 3> kChannelNames{"red", "green", "blue"};
 constexpr double kLeastChannel = 1e-3;
 /// How far a ramp may fall, in parts of full output: more than any instrument's noise.
 constexpr double kLargestFall = 0.02;
-constexpr double kLargestAdditivityError = 0.03;
-constexpr double kLargestColourDrift = 0.03;
 constexpr double kLargestAmbientMismatch = 0.1;
-/// Spots at the very edge would not lie in the picture whole; this part of the raster is left out
-/// on each side and extrapolated over.
-constexpr double kMargin = 0.03;
-/// Texels of the stored vignetting at most: half a texel, which bilinear lookup cannot extrapolate
-/// over, is then under 1 % of the raster.
-constexpr int kVignettingWidth = 64;
-constexpr int kVignettingHeight = 48;
-
-/// cos of the angle between the projector's axis and the ray of `pixel`.
-double axis_cosine(const ProjectorGeometry& geometry, const Eigen::Vector2d& pixel) {
-  const Eigen::Vector3d ray(
-      (pixel.x() - geometry.cx) / geometry.fx, (pixel.y() - geometry.cy) / geometry.fy, 1.0);
-  return 1.0 / ray.norm();
-}
+constexpr double kLargestLampDrift = 0.01;
 
 Eigen::Vector2d raster_centre(const ProjectorGeometry& geometry) {
   return {0.5 * geometry.width, 0.5 * geometry.height};
 }
 
-/// The devices, with retries, averaging and checks of what is read.
-class Session {
- public:
-  Session(Colorimeter& colorimeter, PatchDisplay& display, Progress& progress)
-      : colorimeter_(colorimeter), display_(display), progress_(progress) {}
-
-  [[nodiscard]] Status show(const std::array<std::uint16_t, 3>& code, bool lit = true) {
-    return display_.show(code, lit);
-  }
-
-  /// The mean of `repeats` readings.   @param what  for error messages.
-  [[nodiscard]] Result<Xyz> read(Target target,
-                                 const Eigen::Vector2d& pixel,
-                                 int repeats,
-                                 std::string_view what) {
-    Xyz sum = Xyz::Zero();
-    for (int i = 0; i < repeats; ++i) {
-      auto reading = read_patiently(target, pixel);
-      if (!reading) return fail_while(fmt::format("reading {}", what), reading.error());
-      if (!reading->allFinite())
-        return fail(Errc::kBadFormat,
-                    "reading {}: {} gave a value that is not a number; check that it is not "
-                    "overexposed and read again",
-                    what,
-                    colorimeter_.description());
-      sum += *reading;
-      ++readings_;
-      progress_.advance();
-    }
-    return Xyz(sum / repeats);
-  }
-
-  [[nodiscard]] int readings() const { return readings_; }
-
- private:
-  Result<Xyz> read_patiently(Target target, const Eigen::Vector2d& pixel) {
-    constexpr int kAttempts = 3;
-    for (int attempt = 1;; ++attempt) {
-      auto reading = colorimeter_.read(target, pixel);
-      if (reading || reading.error().code != Errc::kTimeout || attempt == kAttempts) return reading;
-    }
-  }
-
-  Colorimeter& colorimeter_;
-  PatchDisplay& display_;
-  Progress& progress_;
-  int readings_ = 0;
-};
+ColourPatchOptions patch_options(const RadiometryOptions& options) {
+  ColourPatchOptions patches;
+  patches.bits = options.bits;
+  patches.ramp_levels = options.levels;
+  patches.black_repeats = options.repeats;
+  patches.cube = options.cube;
+  patches.grey_levels = options.levels;
+  return patches;
+}
 
 /// Readings of the centre of one target, not corrected for the board's slant.
 struct TargetReadings {
@@ -98,11 +49,14 @@ struct TargetReadings {
 
 class Measurement {
  public:
-  Measurement(Session& session, const ProjectorGeometry& geometry, const RadiometryOptions& options)
+  Measurement(ReadingSession& session,
+              const ProjectorGeometry& geometry,
+              const RadiometryOptions& options)
       : session_(session),
         options_(options),
+        patches_(patch_options(options)),
         centre_(raster_centre(geometry)),
-        ramp_(ramp_codes(options.bits, options.levels)) {
+        full_(static_cast<std::uint16_t>((1U << static_cast<unsigned>(options.bits)) - 1)) {
     result_.profile.geometry = geometry;
     result_.profile.bits = options.bits;
     result_.profile.reference_distance_m = options.reference_distance_m;
@@ -112,9 +66,19 @@ class Measurement {
     VENEER_ASSIGN(white_, read_target(Target::kWhiteReference, "the white reference"));
     VENEER_TRY(set_ambient_and_black());
     VENEER_TRY(check_channels());
-    for (int channel = 0; channel < 3; ++channel) VENEER_TRY(measure_ramp(channel));
-    VENEER_TRY(measure_additivity());
-    VENEER_TRY(measure_vignetting());
+    VENEER_TRY(measure_colour());
+    if (options_.known_fall_off.empty()) {
+      VENEER_TRY(session_.show({full_, full_, full_}));
+      VENEER_ASSIGN(result_.profile.vignetting,
+                    read_spot_fall_off(session_,
+                                       result_.profile.geometry,
+                                       options_.vignetting_columns,
+                                       options_.vignetting_rows,
+                                       white_.ambient));
+    } else {
+      result_.profile.vignetting = options_.known_fall_off;
+    }
+    VENEER_TRY(measure_lamp_drift());
     VENEER_ASSIGN(const TargetReadings object, read_target(Target::kObject, "the object"));
     VENEER_TRY(set_surface(object));
     // M and k are those of a diffuser that faces the lens at the reference distance.
@@ -128,20 +92,6 @@ class Measurement {
   }
 
  private:
-  [[nodiscard]] std::array<std::uint16_t, 3> drive(int channel, std::uint16_t code) const {
-    std::array<std::uint16_t, 3> codes{};
-    codes[static_cast<std::size_t>(channel)] = code;
-    return codes;
-  }
-
-  Result<Xyz> show_and_read(Target target,
-                            const std::array<std::uint16_t, 3>& code,
-                            int repeats,
-                            std::string_view what) {
-    VENEER_TRY(session_.show(code));
-    return session_.read(target, centre_, repeats, what);
-  }
-
   Result<TargetReadings> read_target(Target target, std::string_view name) {
     TargetReadings readings;
     VENEER_TRY(session_.show({}, /*lit=*/false));
@@ -150,14 +100,19 @@ class Measurement {
         session_.read(
             target, centre_, options_.repeats, fmt::format("the ambient light on {}", name)));
     VENEER_ASSIGN(readings.black,
-                  show_and_read(target, {}, options_.repeats, fmt::format("black on {}", name)));
-    for (int channel = 0; channel < 3; ++channel) {
-      VENEER_ASSIGN(const Xyz reading,
-                    show_and_read(target,
-                                  drive(channel, ramp_.back()),
-                                  options_.repeats,
-                                  fmt::format("full {} on {}", kChannelNames.at(channel), name)));
-      readings.full.col(channel) = reading - readings.black;
+                  session_.show_and_read(
+                      target, centre_, {}, options_.repeats, fmt::format("black on {}", name)));
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+      Rgb16 code{};
+      code[channel] = full_;
+      VENEER_ASSIGN(
+          const Xyz reading,
+          session_.show_and_read(target,
+                                 centre_,
+                                 code,
+                                 options_.repeats,
+                                 fmt::format("full {} on {}", kChannelNames[channel], name)));
+      readings.full.col(static_cast<Eigen::Index>(channel)) = reading - readings.black;
     }
     return readings;
   }
@@ -197,144 +152,165 @@ class Measurement {
     return {};
   }
 
-  Status measure_ramp(int channel) {
-    const std::string_view name = kChannelNames.at(static_cast<std::size_t>(channel));
-    std::vector<Xyz> response;
-    for (const std::uint16_t code : ramp_) {
-      if (code == ramp_.back()) break;  // full drive has been read already
+  /// Readings of patches of the white board, one each.
+  Result<std::vector<PatchReading>> read(const std::vector<Rgb16>& codes, std::string_view what) {
+    std::vector<PatchReading> readings;
+    for (const Rgb16& code : codes) {
       VENEER_ASSIGN(
-          const Xyz reading,
-          show_and_read(
-              Target::kWhiteReference, drive(channel, code), 1, fmt::format("{} {}", name, code)));
-      response.push_back(reading - white_.black);
+          const Xyz xyz,
+          session_.show_and_read(Target::kWhiteReference,
+                                 centre_,
+                                 code,
+                                 1,
+                                 fmt::format("{} {}, {}, {}", what, code[0], code[1], code[2])));
+      readings.push_back({drive_of_code(code, options_.bits), xyz});
     }
-    response.push_back(white_.full.col(channel));
-
-    // The direction p and the outputs t that make sum |r_i - t_i p|^2 least: p is the principal
-    // direction of the readings, which one step of power iteration from full drive gives closely.
-    const Xyz start = response.back();
-    Xyz weighted = Xyz::Zero();
-    for (const Xyz& r : response) weighted += r * r.dot(start);
-    const Xyz direction = weighted.normalized();
-    std::vector<double> output;
-    output.reserve(response.size());
-    for (const Xyz& r : response) output.push_back(r.dot(direction));
-    const double full = output.back();
-    result_.profile.primaries.col(channel) = full * direction;
-    VENEER_TRY(set_tone_curve(channel, output));
-
-    double& drift = result_.colour_drift.at(static_cast<std::size_t>(channel));
-    for (std::size_t i = 0; i < response.size(); ++i)
-      if (output[i] > 0.05 * full)
-        drift = std::max(drift, (response[i] - output[i] * direction).norm() / full);
-    if (drift > kLargestColourDrift)
-      result_.warnings.push_back(fmt::format(
-          "the colour of {} drifts by {:.1f} % along its ramp; one matrix cannot follow "
-          "that",
-          name,
-          100 * drift));
-    return {};
+    result_.patches.insert(result_.patches.end(), readings.begin(), readings.end());
+    return readings;
   }
 
-  Status set_tone_curve(int channel, const std::vector<double>& output) {
-    const double full = output.back();
-    std::vector<double> codes{0.0};
-    std::vector<double> knots{0.0};
-    for (std::size_t i = 0; i < output.size(); ++i) {
-      codes.push_back(ramp_[i]);
-      knots.push_back(output[i] / full);
+  Status measure_colour() {
+    VENEER_ASSIGN(const std::vector<PatchReading> mixtures,
+                  read(additivity_patches(patches_), "the mixture"));
+    std::vector<Rgb16> codes = ramp_patches(patches_);
+    VENEER_ASSIGN(std::vector<PatchReading> fitted, read(codes, "the ramp patch"));
+    result_.black = mean_black(fitted);
+    VENEER_TRY(check_ramps(fitted));
+    VENEER_ASSIGN(result_.additivity, test_additivity(mixtures, result_.black));
+    VENEER_TRY(set_additivity_error(mixtures));
+    if (!result_.additivity.additive || !result_.additivity.decisive) {
+      const std::vector<Rgb16> more = interaction_patches(patches_);
+      VENEER_ASSIGN(const std::vector<PatchReading> readings, read(more, "the mixture"));
+      fitted.insert(fitted.end(), readings.begin(), readings.end());
+      codes.insert(codes.end(), more.begin(), more.end());
     }
-    std::vector<double> rising = nearest_rising(knots);
-    for (std::size_t i = 0; i < knots.size(); ++i)
-      if (std::abs(rising[i] - knots[i]) > kLargestFall / 2)  // a fall is shared by two neighbours
-        return fail(
-            Errc::kBadFormat,
-            "measuring the tone curve of {}: it falls near code {}; let the lamp warm up and "
-            "switch dynamic contrast off",
-            kChannelNames.at(static_cast<std::size_t>(channel)),
-            codes[i]);
-    for (double& t : rising) t = std::clamp(t, 0.0, 1.0);
-    rising.front() = 0.0;
-    rising.back() = 1.0;
-
-    const CubicHermite between(std::move(codes), rising, Slopes::kMonotone);
-    std::vector<double> curve(std::size_t{1} << options_.bits);
-    double highest = 0.0;  // the cubic is monotone up to rounding; this takes the rounding out
-    for (std::size_t code = 0; code < curve.size(); ++code) {
-      highest = std::clamp(between(static_cast<double>(code)), highest, 1.0);
-      curve[code] = highest;
+    // The mixtures were read for the verdict, and several times: they serve the fit as well, but
+    // for a model of separate channels only those that are on its ramps.
+    for (const PatchReading& mixture : mixtures) {
+      const bool on_a_ramp = (mixture.drive.array() > 0).count() == 1;
+      const bool known = std::ranges::any_of(
+          fitted, [&](const PatchReading& each) { return each.drive == mixture.drive; });
+      if (known || (!on_a_ramp && !result_.additivity.additive)) fitted.push_back(mixture);
     }
-    curve.back() = 1.0;
-    result_.profile.tone_curves.at(static_cast<std::size_t>(channel)) = std::move(curve);
-    return {};
-  }
-
-  Status measure_additivity() {
-    const std::uint16_t full = ramp_.back();
     VENEER_ASSIGN(
-        const Xyz reading,
-        show_and_read(Target::kWhiteReference, {full, full, full}, options_.repeats, "white"));
-    const double white = reading.y() - white_.black.y();
-    const double sum = white_.full.row(1).sum();
-    if (!(white > 0))
-      return fail(Errc::kBadFormat, "measuring white: it gives no light above black");
-    result_.additivity_error = (sum - white) / white;
-    if (std::abs(result_.additivity_error) > kLargestAdditivityError)
-      result_.warnings.push_back(fmt::format(
-          "the channels are not additive: R + G + B is {:+.1f} % off white; switch colour "
-          "boosting off",
-          100 * result_.additivity_error));
+        const std::vector<PatchReading> held_out,
+        read(verification_patches(options_.bits, options_.held_out, codes), "the held-out patch"));
+    VENEER_ASSIGN(const SelectedColour selected,
+                  select_colour_model(fitted, held_out, result_.black, result_.additivity));
+    VENEER_ASSIGN(BakedColour baked, bake(*selected.model, options_.bits));
+    result_.profile.tone_curves = std::move(baked.tone_curves);
+    result_.profile.primaries = baked.primaries;
+    result_.profile.residual = std::move(baked.residual);
+    result_.profile.colour_model = selected.model->name();
+    result_.candidates = selected.candidates;
+    result_.choice = selected.reason;
+    const auto chosen =
+        std::ranges::find(selected.candidates, selected.model->name(), &ColourCandidate::name);
+    VENEER_CHECK(chosen != selected.candidates.end());
+    result_.held_out = chosen->held_out;
+    std::set<std::tuple<double, double, double>> different;
+    for (const PatchReading& each : fitted)
+      different.insert({each.drive.x(), each.drive.y(), each.drive.z()});
+    result_.fitted_patches = static_cast<int>(different.size());
+    set_colour_drift(fitted);
     return {};
   }
 
-  /// With white still shown. Read on a coarse grid, filled in with cubics along rows, then columns.
-  Status measure_vignetting() {
-    const ProjectorGeometry& g = result_.profile.geometry;
-    const auto spots = [](int count, int extent) {
-      std::vector<double> at;
-      at.reserve(static_cast<std::size_t>(count));
-      for (int i = 0; i < count; ++i)
-        at.push_back(std::lerp(kMargin, 1.0 - kMargin, i / (count - 1.0)) * extent);
-      return at;
-    };
-    const std::vector<double> xs = spots(options_.vignetting_columns, g.width);
-    const std::vector<double> ys = spots(options_.vignetting_rows, g.height);
-    const int width = std::min(kVignettingWidth, g.width);
-    const int height = std::min(kVignettingHeight, g.height);
+  [[nodiscard]] static Xyz mean_black(const std::vector<PatchReading>& readings) {
+    Xyz sum = Xyz::Zero();
+    int count = 0;
+    for (const PatchReading& each : readings) {
+      if (!each.drive.isZero()) continue;
+      sum += each.xyz;
+      ++count;
+    }
+    return count > 0 ? Xyz(sum / count) : sum;
+  }
 
-    // The reference is the raster's centre, read in the same run so that lamp drift matters little.
-    VENEER_ASSIGN(const double reference, read_fall_off(centre_));
-    std::vector<std::vector<double>> columns(static_cast<std::size_t>(width));
-    for (const double y : ys) {
-      std::vector<double> row;
-      for (const double x : xs) {
-        VENEER_ASSIGN(const double intensity, read_fall_off({x, y}));
-        row.push_back(intensity / reference);
+  /// The readings of one channel alone above black, by drive.
+  [[nodiscard]] std::vector<PatchReading> ramp_of(int channel,
+                                                  const std::vector<PatchReading>& readings) const {
+    std::vector<PatchReading> ramp;
+    for (const PatchReading& each : readings) {
+      if ((each.drive.array() > 0).count() != 1 || !(each.drive[channel] > 0)) continue;
+      ramp.push_back({each.drive, each.xyz - result_.black});
+    }
+    std::ranges::stable_sort(
+        ramp, {}, [channel](const PatchReading& each) { return each.drive[channel]; });
+    return ramp;
+  }
+
+  Status check_ramps(const std::vector<PatchReading>& readings) const {
+    for (int channel = 0; channel < 3; ++channel) {
+      const Xyz full = white_.full.col(channel);
+      double highest = 0;
+      for (const PatchReading& each : ramp_of(channel, readings)) {
+        const double output = each.xyz.dot(full) / full.squaredNorm();
+        if (highest - output > kLargestFall)
+          return fail(
+              Errc::kBadFormat,
+              "measuring the tone curve of {}: it falls near code {:.0f}; let the lamp warm up and "
+              "switch dynamic contrast off",
+              kChannelNames.at(static_cast<std::size_t>(channel)),
+              each.drive[channel] * full_);
+        highest = std::max(highest, output);
       }
-      const CubicHermite along(xs, row, Slopes::kSmooth);
-      for (int x = 0; x < width; ++x)
-        columns[static_cast<std::size_t>(x)].push_back(along((x + 0.5) / width * g.width));
-    }
-    result_.profile.vignetting = Image<float>(width, height);
-    for (int x = 0; x < width; ++x) {
-      const CubicHermite along(ys, columns[static_cast<std::size_t>(x)], Slopes::kSmooth);
-      for (int y = 0; y < height; ++y)
-        result_.profile.vignetting(x, y) =
-            static_cast<float>(std::max(along((y + 0.5) / height * g.height), 1e-3));
     }
     return {};
   }
 
-  Result<double> read_fall_off(const Eigen::Vector2d& pixel) {
-    const std::string what = fmt::format("white at pixel {:.0f}, {:.0f}", pixel.x(), pixel.y());
-    VENEER_ASSIGN(const Xyz reading, session_.read(Target::kWhiteReference, pixel, 1, what));
-    const double light = reading.y() - white_.ambient.y();
-    if (!(light > 0))
-      return fail(
-          Errc::kBadFormat,
-          "reading {}: there is no light above the ambient; does the board fill the picture?",
-          what);
-    return light / std::pow(axis_cosine(result_.profile.geometry, pixel), 3);
+  void set_colour_drift(const std::vector<PatchReading>& readings) {
+    for (int channel = 0; channel < 3; ++channel) {
+      const std::vector<PatchReading> ramp = ramp_of(channel, readings);
+      // The principal direction of the readings, which one step of power iteration from full drive
+      // gives closely.
+      const Xyz start = white_.full.col(channel);
+      Xyz weighted = Xyz::Zero();
+      for (const PatchReading& each : ramp) weighted += each.xyz * each.xyz.dot(start);
+      const Xyz direction = weighted.normalized();
+      const double full = start.dot(direction);
+      double& drift = result_.colour_drift.at(static_cast<std::size_t>(channel));
+      for (const PatchReading& each : ramp) {
+        const double output = each.xyz.dot(direction);
+        if (output > 0.05 * full)
+          drift = std::max(drift, (each.xyz - output * direction).norm() / full);
+      }
+    }
+  }
+
+  Status set_additivity_error(const std::vector<PatchReading>& mixtures) {
+    double sum = 0;
+    int count = 0;
+    for (const PatchReading& each : mixtures) {
+      if (!each.drive.isOnes()) continue;
+      sum += each.xyz.y() - result_.black.y();
+      ++count;
+    }
+    white_luminance_ = count > 0 ? sum / count : 0;
+    if (!(white_luminance_ > 0))
+      return fail(Errc::kBadFormat, "measuring white: it gives no light above black");
+    result_.additivity_error = (white_.full.row(1).sum() - white_luminance_) / white_luminance_;
+    if (!result_.additivity.additive)
+      result_.warnings.push_back(fmt::format(
+          "{}; switch colour boosting (BrilliantColor, white segment) off if you can, else a "
+          "model of mixtures is used",
+          result_.additivity.reason));
+    return {};
+  }
+
+  Status measure_lamp_drift() {
+    VENEER_ASSIGN(const Xyz reading,
+                  session_.show_and_read(Target::kWhiteReference,
+                                         centre_,
+                                         {full_, full_, full_},
+                                         options_.repeats,
+                                         "white at the end"));
+    result_.lamp_drift = (reading.y() - result_.black.y()) / white_luminance_ - 1;
+    if (std::abs(result_.lamp_drift) > kLargestLampDrift)
+      result_.warnings.push_back(fmt::format(
+          "white changed by {:+.1f} % while it was measured; let the lamp warm up longer",
+          100 * result_.lamp_drift));
+    return {};
   }
 
   Status set_surface(const TargetReadings& object) {
@@ -360,11 +336,13 @@ class Measurement {
     return {};
   }
 
-  Session& session_;
+  ReadingSession& session_;
   const RadiometryOptions& options_;
+  ColourPatchOptions patches_;
   Eigen::Vector2d centre_;
-  std::vector<std::uint16_t> ramp_;
+  std::uint16_t full_;
   TargetReadings white_;
+  double white_luminance_ = 0;  // above black
   MeasuredProfile result_;
 };
 
@@ -380,28 +358,15 @@ Status RadiometryOptions::check() const {
                 low,
                 high);
   };
-  VENEER_TRY(in_range("bits", bits, 1, 16));
+  VENEER_TRY(in_range("bits", bits, 4, 16));
   VENEER_TRY(in_range("reference_distance_m", reference_distance_m, 1e-3, 1e3));
-  VENEER_TRY(in_range("levels", levels, std::min(4, (1 << bits) - 1), (1 << bits) - 1));
+  VENEER_TRY(in_range("levels", levels, 4, std::min(40, (1 << bits) - 1)));
   VENEER_TRY(in_range("repeats", repeats, 1, 100));
+  VENEER_TRY(in_range("held_out", held_out, 8, 1000));
+  VENEER_TRY(in_range("cube", cube, 2, 9));
   VENEER_TRY(in_range("vignetting_columns", vignetting_columns, 2, 100));
-  return in_range("vignetting_rows", vignetting_rows, 2, 100);
-}
-
-std::vector<std::uint16_t> ramp_codes(int bits, int levels) {
-  // Equal steps of L* are roughly equal steps of the cube root of the light.
-  constexpr double kSpacing = 3.0 / 2.2;
-  const int full = (1 << bits) - 1;
-  std::vector<std::uint16_t> codes;
-  int previous = 0;
-  for (int i = 1; i <= levels; ++i) {
-    const int wanted =
-        static_cast<int>(std::lround(full * std::pow(static_cast<double>(i) / levels, kSpacing)));
-    // Rounding may make codes equal in the dark; the rest of the ramp must still fit above.
-    previous = std::clamp(wanted, previous + 1, full - (levels - i));
-    codes.push_back(static_cast<std::uint16_t>(previous));
-  }
-  return codes;
+  VENEER_TRY(in_range("vignetting_rows", vignetting_rows, 2, 100));
+  return patch_options(*this).check();
 }
 
 Xyz predict_reading(const ProjectorProfile& profile,
@@ -427,11 +392,16 @@ Result<MeasuredProfile> measure_profile(Colorimeter& colorimeter,
                                         const RadiometryOptions& options,
                                         Progress& progress) {
   VENEER_TRY(options.check());
+  const ColourPatchOptions patches = patch_options(options);
   const int per_target = 5 * options.repeats;  // ambient, black, three channels
-  const int readings = 2 * per_target + 3 * (options.levels - 1) + options.repeats + 1 +
-                       options.vignetting_columns * options.vignetting_rows;
+  // Those that channels which do not add up need besides are not known yet.
+  const int readings =
+      2 * per_target + options.repeats + options.held_out +
+      static_cast<int>(additivity_patches(patches).size() + ramp_patches(patches).size()) +
+      (options.known_fall_off.empty() ? 1 + options.vignetting_columns * options.vignetting_rows
+                                      : 0);
   progress.start("measuring the projector", readings);
-  Session session(colorimeter, display, progress);
+  ReadingSession session(colorimeter, display, progress);
   auto measured = Measurement(session, geometry, options).run();
   progress.finish(measured ? fmt::format("{} readings, additivity {:+.2f} %",
                                          measured->readings,

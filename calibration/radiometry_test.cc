@@ -11,6 +11,7 @@
 #include <set>
 
 #include "base/random.h"
+#include "calibration/colour/colour_patches.h"
 #include "calibration/verification.h"
 
 namespace veneer::calibration {
@@ -85,7 +86,8 @@ class FakeProjector final : public Colorimeter, public PatchDisplay {
   }
   Result<ProfileVerification> verify(const ProjectorProfile& profile) {
     SilentProgress progress;
-    return verify_profile(*this, *this, profile, verification_patches(profile, 200, 99), progress);
+    return verify_profile(
+        *this, *this, profile, verification_patches(profile, 200, 99), {1}, progress);
   }
   void expect_refused(std::string_view reason) {
     const auto measured = measure();
@@ -182,7 +184,7 @@ TEST(MeasureProfile, PredictsPatchesItHasNotSeen) {
   ASSERT_TRUE(measured) << measured.error().what;
   const auto verified = projector.verify(measured->profile);
   ASSERT_TRUE(verified) << verified.error().what;
-  EXPECT_EQ(verified->de00.size(), 200U);
+  EXPECT_EQ(verified->patches.size(), 200U);
   EXPECT_LT(verified->de00_mean, 0.15);
   EXPECT_LE(verified->de00_mean, verified->de00_p95);
   EXPECT_LE(verified->de00_p95, verified->de00_max);
@@ -222,7 +224,7 @@ TEST(MeasureProfile, WarnsOfAWhiteSegment) {
   ASSERT_TRUE(measured) << measured.error().what;
   EXPECT_LT(measured->additivity_error, -0.03);
   ASSERT_EQ(measured->warnings.size(), 1U);
-  EXPECT_THAT(measured->warnings.front(), HasSubstr("additive"));
+  EXPECT_THAT(measured->warnings.front(), HasSubstr("do not add up"));
 }
 
 TEST(MeasureProfile, WarnsOfAmbientLightThatTheObjectSeesDifferently) {
@@ -367,7 +369,7 @@ TEST(VerifyProfile, RefusesAnEmptyList) {
   const auto measured = projector.measure();
   ASSERT_TRUE(measured) << measured.error().what;
   SilentProgress progress;
-  const auto verified = verify_profile(projector, projector, measured->profile, {}, progress);
+  const auto verified = verify_profile(projector, projector, measured->profile, {}, {}, progress);
   ASSERT_FALSE(verified);
   EXPECT_EQ(verified.error().code, Errc::kInvalidOption);
 }

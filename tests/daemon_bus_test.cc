@@ -109,7 +109,8 @@ class DaemonOnTheBus : public ::testing::Test {
     for (const std::string& line :
          {"synthesize cloth --size 8 --views 25 --lights 25 --samples 1 -o " + here + "/s.btfset",
           "fit " + here + "/s.btfset --model phong -o " + here + "/material.safetensors",
-          "calibrate --bench " + etc + "/benches/demo.toml -o " + here + "/profile"}) {
+          "calibrate --yes --board-poses 5 --bench " + etc + "/benches/demo.toml -o " + here +
+              "/profile"}) {
       ASSERT_EQ(std::system((VENEER_PROGRAMS "/veneer " + line + " --quiet </dev/null").c_str()), 0)
           << line;
     }

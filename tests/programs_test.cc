@@ -35,7 +35,8 @@ class ProgramsTest : public testing::Test {
           "veneer fit " + here +
               "/cloth.btfset --model texel-colours --components 3+1 --clusters 2 --angular 8 -o " +
               here + "/material.safetensors",
-          "veneer calibrate --bench " + etc + "/benches/demo.toml -o " + here + "/profile"}) {
+          "veneer calibrate --yes --board-poses 5 --bench " + etc + "/benches/demo.toml -o " +
+              here + "/profile"}) {
       const Outcome outcome = run(line);
       ASSERT_EQ(outcome.exit_code, 0) << line << "\n" << outcome.err;
     }

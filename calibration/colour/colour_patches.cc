@@ -7,8 +7,6 @@
 #include <set>
 #include <string_view>
 
-#include "calibration/radiometry.h"
-
 namespace veneer::calibration {
 namespace {
 
@@ -34,6 +32,22 @@ double radical_inverse(int index, int base) {
 }
 
 }  // namespace
+
+std::vector<std::uint16_t> ramp_codes(int bits, int levels) {
+  // Equal steps of L* are roughly equal steps of the cube root of the light.
+  constexpr double kSpacing = 3.0 / 2.2;
+  const int full = (1 << bits) - 1;
+  std::vector<std::uint16_t> codes;
+  int previous = 0;
+  for (int i = 1; i <= levels; ++i) {
+    const int wanted =
+        static_cast<int>(std::lround(full * std::pow(static_cast<double>(i) / levels, kSpacing)));
+    // Rounding may make codes equal in the dark; the rest of the ramp must still fit above.
+    previous = std::clamp(wanted, previous + 1, full - (levels - i));
+    codes.push_back(static_cast<std::uint16_t>(previous));
+  }
+  return codes;
+}
 
 Status ColourPatchOptions::check() const {
   const auto in_range = [](std::string_view name, int value, int low, int high) -> Status {

@@ -30,6 +30,10 @@ struct ColourPatchOptions {
   [[nodiscard]] Status check() const;
 };
 
+/// The codes of a ramp: `levels` different ones from above 0 to full, about equally spaced in L* on
+/// a display of exponent 2.2.
+[[nodiscard]] std::vector<std::uint16_t> ramp_codes(int bits, int levels);
+
 /// Black and three ramps: all that models without interaction need, 3 ramp_levels + black_repeats.
 /// @param options  must pass check(), as below.
 [[nodiscard]] std::vector<Rgb16> ramp_patches(const ColourPatchOptions& options);

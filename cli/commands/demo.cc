@@ -8,7 +8,8 @@
 #include "base/files.h"
 #include "btf/material.h"
 #include "btf/sample_set.h"
-#include "cli/bench_profile.h"
+#include "cli/calibrate/bench_devices.h"
+#include "cli/calibrate/operators.h"
 #include "cli/commands/commands.h"
 #include "cli/programs.h"
 #include "cli/report/report.h"
@@ -76,16 +77,25 @@ Status fit_material(const DemoOptions& options,
   return btf::save_material(*material, material_path, provenance);
 }
 
-Status measure_profile(const fs::path& bench_path,
-                       const fs::path& profile_path,
-                       Progress& progress) {
-  VENEER_ASSIGN(const std::unique_ptr<simulation::Bench> bench,
-                simulation::Bench::load(bench_path));
-  simulation::VirtualPatchDisplay display(*bench);
-  simulation::VirtualColorimeter colorimeter(*bench, display, {});
-  VENEER_ASSIGN(const calibration::MeasuredProfile measured,
-                measure_profile_on_bench(*bench, display, colorimeter, progress));
-  return measured.profile.save(profile_path);
+/// The profile as the wizard finds it, without questions: nothing of the bench's truth is taken
+/// over.
+Status calibrate(const fs::path& bench_path, const fs::path& profile_path, Progress& progress) {
+  AutomaticOperator nobody(/*quiet=*/true);
+  VENEER_ASSIGN(const std::unique_ptr<BenchDevices> bench, BenchDevices::open(bench_path, nobody));
+  calibration::WizardOptions options;
+  options.profile = profile_path;
+  options.session = profile_path;
+  options.session += ".session";
+  bench->fill(options);
+  calibration::Devices devices = bench->devices();
+  // What an older program found may not be what this one would.
+  std::error_code ignored;
+  fs::remove_all(options.session, ignored);
+  VENEER_ASSIGN(const calibration::WizardOutcome outcome,
+                calibration::run_wizard(options, devices, progress));
+  VENEER_CHECK(outcome.finished);
+  fs::remove_all(options.session, ignored);
+  return {};
 }
 
 /// Removes what an earlier run left, so that no old picture is taken for a new one. A folder that
@@ -142,7 +152,7 @@ Result<int> run_demo(CommandLine& line) {
   VENEER_TRY(clear_results(out));
   VENEER_ASSIGN(const fs::path set, sample_set(options, line.progress()));
   VENEER_TRY(fit_material(options, set, out / "material.safetensors", line.progress()));
-  VENEER_TRY(measure_profile(bench, out / "profile", line.progress()));
+  VENEER_TRY(calibrate(bench, out / "profile", line.progress()));
   for (const char* name : {"veneer.toml", "scene.toml"}) {
     VENEER_ASSIGN(const std::string text, read_text(options.etc / "demo" / name));
     VENEER_TRY(write_text(out / name, text));

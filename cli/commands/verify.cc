@@ -1,57 +1,129 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nlohmann/json.hpp>
 
+#include <memory>
+
 #include "base/exit_code.h"
 #include "calibration/verification.h"
+#include "cli/calibrate/bench_devices.h"
+#include "cli/calibrate/operators.h"
+#include "cli/calibrate/rig_devices.h"
 #include "cli/commands/commands.h"
 #include "cli/report/verification.h"
-#include "simulation/bench/colorimeter.h"
+#include "simulation/bench/registration.h"
 
 namespace veneer::cli {
 namespace {
 
 namespace fs = std::filesystem;
 
+struct PatchOptions {
+  fs::path bench;
+  fs::path rig;
+  fs::path profile;
+  int patches = 64;
+  int repeats = 8;
+};
+
+struct Devices {
+  std::unique_ptr<calibration::Operator> hands;
+  std::unique_ptr<BenchDevices> bench;
+  std::unique_ptr<RigDevices> rig;
+  calibration::Devices devices;
+};
+
+Result<Devices> open_devices(CommandLine& line, const PatchOptions& options) {
+  Devices opened;
+  if (!options.bench.empty()) {
+    opened.hands = std::make_unique<AutomaticOperator>(line.quiet());
+    VENEER_ASSIGN(opened.bench, BenchDevices::open(options.bench, *opened.hands));
+    opened.devices = opened.bench->devices();
+    // A profile is held against a lamp that is warm.
+    constexpr double kWarm_s = 3600;
+    VENEER_TRY(opened.devices.display->show({}));
+    opened.devices.clock->sleep_until(opened.devices.clock->now() + from_seconds(kWarm_s));
+    return opened;
+  }
+  opened.hands = std::make_unique<TerminalOperator>();
+  calibration::WizardOptions unused;
+  VENEER_ASSIGN(opened.rig, RigDevices::open(options.rig, *opened.hands, unused));
+  opened.devices = opened.rig->devices();
+  return opened;
+}
+
 /// Holds a profile against readings of patches that it was not made from.
-Result<int> verify_patches(CommandLine& line,
-                           const fs::path& bench_path,
-                           const fs::path& profile_path) {
-  constexpr int kPatches = 200;
-  constexpr std::uint64_t kSeed = 2;
-  VENEER_ASSIGN(const std::unique_ptr<simulation::Bench> bench,
-                simulation::Bench::load(bench_path));
+Result<int> verify_patches(CommandLine& line, const PatchOptions& options) {
+  constexpr std::uint64_t kSeed = 2;  // other patches than the wizard's own proof
   VENEER_ASSIGN(const calibration::ProjectorProfile profile,
-                calibration::ProjectorProfile::load(profile_path));
-  simulation::VirtualPatchDisplay display(*bench);
-  simulation::VirtualColorimeter colorimeter(*bench, display, {});
+                calibration::ProjectorProfile::load(options.profile));
+  VENEER_ASSIGN(Devices opened, open_devices(line, options));
+  const calibration::Devices& devices = opened.devices;
+  if (devices.width != profile.geometry.width || devices.height != profile.geometry.height ||
+      devices.bits != profile.bits)
+    return fail(
+        Errc::kInvalidOption,
+        "verifying {}: it is for {} x {} pixels of {} bits, the projector has {} x {} of {}; "
+        "set the mode that was calibrated, or calibrate again",
+        options.profile.string(),
+        profile.geometry.width,
+        profile.geometry.height,
+        profile.bits,
+        devices.width,
+        devices.height,
+        devices.bits);
   VENEER_ASSIGN(
       const calibration::ProfileVerification result,
-      calibration::verify_profile(colorimeter,
-                                  display,
-                                  profile,
-                                  calibration::verification_patches(profile, kPatches, kSeed),
-                                  line.progress()));
-  line.print({{"patches", kPatches},
-              {"de00_mean", result.de00_mean},
-              {"de00_p95", result.de00_p95},
-              {"de00_max", result.de00_max}},
-             fmt::format("{} patches: dE00 {:.2f} mean, {:.2f} at 95 %, {:.2f} max",
-                         kPatches,
-                         result.de00_mean,
-                         result.de00_p95,
-                         result.de00_max));
-  return kExitDone;
+      calibration::verify_profile(
+          *devices.colorimeter,
+          *devices.display,
+          profile,
+          calibration::verification_patches(profile, options.patches, kSeed, devices.aims_itself),
+          {options.repeats},
+          line.progress()));
+  const calibration::Verdict verdict = calibration::judge(result);
+  nlohmann::ordered_json json{{"patches", options.patches},
+                              {"de00_mean", result.de00_mean},
+                              {"de00_p95", result.de00_p95},
+                              {"de00_max", result.de00_max},
+                              {"noise_de00_mean", result.noise_de00_mean},
+                              {"relative_noise", result.relative_noise},
+                              {"additivity_error", result.additivity_error},
+                              {"gates", {verdict.gate_mean, verdict.gate_p95, verdict.gate_max}},
+                              {"good", verdict.good},
+                              {"calibrate_again", verdict.calibrate_again},
+                              {"verdict", verdict.sentence}};
+  std::string text = verdict.sentence;
+  if (opened.bench) {
+    // Only a bench knows where its pixels really land.
+    VENEER_ASSIGN(const simulation::RegistrationError registration,
+                  simulation::registration_error(opened.bench->bench(), profile.geometry));
+    json["registration_p50_px"] = registration.p50_px;
+    json["registration_p95_px"] = registration.p95_px;
+    json["registration_max_px"] = registration.max_px;
+    text += fmt::format("\nOn the object its pixels land {:.2f} px (95 %) from where they should.",
+                        registration.p95_px);
+  }
+  line.print(json, text);
+  return verdict.good ? kExitDone : kExitGateMissed;
 }
 
 }  // namespace
 
 Result<int> run_verify(CommandLine& line) {
   VerificationOptions options;
-  fs::path profile;
+  PatchOptions patches;
   CLI::App& app = line.app();
-  app.add_option("--bench", options.bench, "The virtual bench, bench.toml")->required();
+  auto* bench_option = app.add_option("--bench", options.bench, "The virtual bench, bench.toml");
+  app.add_option("--rig", patches.rig, "Real devices, rig.toml, as \"veneer calibrate\" takes them")
+      ->excludes(bench_option);
   auto* profile_option =
-      app.add_option("--profile", profile, "A profile to hold against readings of the bench");
+      app.add_option("--profile", patches.profile, "A profile to hold against readings of patches");
+  app.add_option("--patches", patches.patches, "How many")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 10000));
+  app.add_option("--repeats", patches.repeats, "Readings of each that are averaged")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100));
   auto* run_option = app.add_option(
       "--run", options.run, "The folder of a run of veneerd, to be seen on the bench");
   auto* set_option =
@@ -67,11 +139,18 @@ Result<int> run_verify(CommandLine& line) {
   app.add_option("--pictures", options.pictures, "Folder for pictures of what is seen");
   run_option->excludes(profile_option);
   line.parse();
-  if (!profile.empty()) return verify_patches(line, options.bench, profile);
-  if (options.run.empty() || (options.set.empty() && options.material.empty())) {
+  if (options.bench.empty() && patches.rig.empty())
     return fail(Errc::kInvalidOption,
-                "say what to verify: --profile PROFILE, or --run FOLDER with --set SET or "
-                "--material MATERIAL");
+                "say where to look: --bench BENCH.toml, or --rig RIG.toml for real devices");
+  if (!patches.profile.empty()) {
+    patches.bench = options.bench;
+    return verify_patches(line, patches);
+  }
+  if (options.run.empty() || options.bench.empty() ||
+      (options.set.empty() && options.material.empty())) {
+    return fail(Errc::kInvalidOption,
+                "say what to verify: --profile PROFILE, or --bench BENCH.toml with --run FOLDER and "
+                "--set SET or --material MATERIAL");
   }
 
   VENEER_ASSIGN(const RunVerification result, verify_run(options, line.progress()));

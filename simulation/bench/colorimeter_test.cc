@@ -127,7 +127,7 @@ TEST(MeasureProfile, OfTheDemosBenchPredictsWhatItHasNotSeen) {
 
   const auto patches = calibration::verification_patches(measured->profile, 300, 77);
   const auto verified =
-      calibration::verify_profile(colorimeter, display, measured->profile, patches, progress);
+      calibration::verify_profile(colorimeter, display, measured->profile, patches, {1}, progress);
   ASSERT_TRUE(verified) << verified.error().what;
   EXPECT_LT(verified->de00_mean, 1.0);
   RecordProperty("de00_mean", fmt::format("{:.3f}", verified->de00_mean));

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "base/result.h"
+#include "base/unique_handle.h"
+
+namespace veneer::calibration {
+
+/// What a session has found out so far, on disk: a line of JSON a finding, in the order in which
+/// they came, each on the disk before anybody goes on. A session that was killed, or whose machine
+/// lost its power, is resumed by running it again: what the journal has is not measured anew. One
+/// thread.
+class Journal {
+ public:
+  /// Opens `folder`/journal.jsonl or begins it. A line that was cut off at its end, as by a power
+  /// loss, is dropped.
+  /// @param identity  what must be the same for the findings to hold: devices, raster, options.
+  /// Errors: kBadFormat (a journal of another Veneer, a damaged one), kInvalidOption (of another
+  /// identity, says what differs), kUnavailable (another program has it open), kIo.
+  [[nodiscard]] static Result<Journal> open(const std::filesystem::path& folder,
+                                            const nlohmann::json& identity);
+
+  /// Nothing where it is not known.
+  [[nodiscard]] const nlohmann::json* find(const std::string& step, const std::string& key) const;
+  /// Written and flushed to the disk on return; on an error the finding is not known.
+  /// Errors: kIo (disk full, for example).
+  [[nodiscard]] Status add(const std::string& step, const std::string& key, nlohmann::json value);
+  /// A step's findings hold no longer. Errors: kIo.
+  [[nodiscard]] Status forget(const std::string& step);
+  [[nodiscard]] std::size_t size() const { return findings_.size(); }
+  /// Whether there were findings when it was opened.
+  [[nodiscard]] bool resumed() const { return resumed_; }
+
+ private:
+  Journal(std::filesystem::path path, UniqueFd fd) : path_(std::move(path)), fd_(std::move(fd)) {}
+  [[nodiscard]] Status append(const nlohmann::json& line);
+  [[nodiscard]] Status take(const std::string& text, const nlohmann::json& identity);
+
+  std::filesystem::path path_;
+  UniqueFd fd_;  // locked
+  std::map<std::pair<std::string, std::string>, nlohmann::json> findings_;
+  bool resumed_ = false;
+};
+
+}  // namespace veneer::calibration
