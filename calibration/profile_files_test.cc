@@ -84,7 +84,12 @@ TEST(ProfileFiles, SayTheSameAsTheProfile) {
     const auto cube = read_cube(folder.path() / "srgb_to_drive.cube");
     ASSERT_TRUE(cube) << cube.error().what;
     const Xyz white = light_of(profile, cube->values.back());
-    for (const int node : {5, 40, 1000, 20000, 30000, 35900}) {
+    // Of a white segment the pure colours fall short of the white and are cut; greys are not.
+    constexpr int kGreyStep = 1 + 33 + 33 * 33;
+    const std::vector<int> nodes =
+        white_segment ? std::vector<int>{4 * kGreyStep, 16 * kGreyStep, 30 * kGreyStep}
+                      : std::vector<int>{5, 40, 1000, 20000, 30000, 35900};
+    for (const int node : nodes) {
       const int r = node % 33;
       const int g = node / 33 % 33;
       const int b = node / 33 / 33;
@@ -92,8 +97,8 @@ TEST(ProfileFiles, SayTheSameAsTheProfile) {
           srgb_decode(r / 32.0), srgb_decode(g / 32.0), srgb_decode(b / 32.0));
       const Xyz wanted = white.y() * (xyz_from_srgb() * linear);
       const Xyz shown = light_of(profile, cube->values[static_cast<std::size_t>(node)]);
-      // Black is there, and saturated colours cannot be had without it.
-      EXPECT_LT((shown - wanted).norm(), 0.02 * white.y()) << node;
+      // Black is always there, and is all that dark and saturated colours are off by.
+      EXPECT_LT((shown - wanted).norm(), 3e-3 * white.y()) << node;
     }
     EXPECT_LT((white / white.y() - xyz_from_srgb() * Eigen::Vector3d::Ones()).norm(), 0.01);
 

@@ -10,14 +10,13 @@
 namespace veneer::simulation {
 namespace {
 
-std::filesystem::path benches() {
-  return std::filesystem::path(__FILE__).parent_path() / "../../etc/benches";
-}
+std::filesystem::path benches() { return VENEER_ETC "/benches"; }
 
 std::unique_ptr<Bench> bench_named(const std::string& name) {
   auto bench = Bench::load(benches() / (name + ".toml"));
-  EXPECT_TRUE(bench) << name << ": " << bench.error().what;
-  return bench ? std::move(*bench) : nullptr;
+  if (!bench) ADD_FAILURE() << name << ": " << bench.error().what;
+  VENEER_CHECK(bench.has_value());
+  return std::move(*bench);
 }
 
 constexpr std::uint16_t kFull = 255;

@@ -112,8 +112,7 @@ TEST(VirtualColorimeter, RefusesWhatIsNotOnTheRaster) {
 }
 
 TEST(MeasureProfile, OfTheDemosBenchPredictsWhatItHasNotSeen) {
-  const auto bench =
-      Bench::load(std::filesystem::path(__FILE__).parent_path() / "../../etc/benches/demo.toml");
+  const auto bench = Bench::load(VENEER_ETC "/benches/demo.toml");
   ASSERT_TRUE(bench) << bench.error().what;
   VirtualPatchDisplay display(**bench);
   VirtualColorimeter colorimeter(**bench, display, {});

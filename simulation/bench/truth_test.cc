@@ -18,9 +18,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-std::filesystem::path demo_path() {
-  return std::filesystem::path(__FILE__).parent_path() / "../../etc/benches/demo.toml";
-}
+std::filesystem::path demo_path() { return VENEER_ETC "/benches/demo.toml"; }
 
 /// Loads the demo's bench with one piece of text replaced.
 Result<BenchTruth> load_changed(std::string_view from, std::string_view to) {
