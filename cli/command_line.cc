@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <new>
+
+#include "base/exit_code.h"
 
 namespace veneer::cli {
 
@@ -33,6 +36,23 @@ void CommandLine::print(const nlohmann::ordered_json& object, const std::string&
 
 void CommandLine::note(const std::string& text) const {
   if (!quiet_) fmt::print(stderr, "{}\n", text);
+}
+
+int run_command(const Command& command, std::vector<std::string> arguments) {
+  CommandLine line(std::string(command.name), std::string(command.summary), std::move(arguments));
+  try {
+    const Result<int> exit_code = command.run(line);
+    if (exit_code) return *exit_code;
+    fmt::print(stderr, "veneer {}: {}\n", command.name, exit_code.error().what);
+    return exit_code_of(exit_code.error());
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr,
+               "veneer {}: there is not enough memory; close other programs, or crop the data\n",
+               command.name);
+    return kExitFailed;
+  } catch (const CLI::ParseError& error) {
+    return line.app().exit(error) == 0 ? kExitDone : kExitUsage;
+  }
 }
 
 }  // namespace veneer::cli

@@ -6,6 +6,7 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/progress.h"
@@ -46,5 +47,15 @@ class CommandLine {
 
 /// A command: declares its options, parses, works, prints; returns the exit code.
 using RunCommand = Result<int> (*)(CommandLine& line);
+
+/// One line of a program's table of commands.
+struct Command {
+  std::string_view name;
+  std::string_view summary;
+  RunCommand run;
+};
+/// Runs a command with its arguments; says on standard error what went wrong. Returns the program's
+/// exit code.
+[[nodiscard]] int run_command(const Command& command, std::vector<std::string> arguments);
 
 }  // namespace veneer::cli

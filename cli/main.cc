@@ -2,7 +2,6 @@
 // veneer: every tool around the daemon.
 #include <algorithm>
 #include <array>
-#include <new>
 #include <string_view>
 
 #include "base/exit_code.h"
@@ -13,15 +12,13 @@ namespace {
 
 using namespace veneer;
 
-struct Command {
-  std::string_view name;
-  std::string_view summary;
-  cli::RunCommand run;
-};
+using cli::Command;
 
 constexpr std::array kCommands{
     Command{"bench", "Time what this machine does: bench render, fit, query", &cli::run_bench},
-    Command{"calibrate", "Measure a projector and write its profile", &cli::run_calibrate},
+    Command{"calibrate",
+            "Lead through measuring a projector and write its profile",
+            &cli::run_calibrate},
     Command{"compare",
             "Fit every model of the literature and print the published tables",
             &cli::run_compare},
@@ -38,7 +35,7 @@ constexpr std::array kCommands{
     Command{"synthesize", "Path-trace a material as a sample set", &cli::run_synthesize},
     Command{"track", "List, watch and record trackers", &cli::run_track},
     Command{"verify",
-            "Show recorded frames on the virtual bench and compare with the material",
+            "Hold a profile against fresh readings, or a run against its material",
             &cli::run_verify},
 };
 static_assert(std::ranges::is_sorted(kCommands, {}, &Command::name));
@@ -68,20 +65,5 @@ int main(int argc, char** argv) {
     print_usage(stderr);
     return kExitUsage;
   }
-  cli::CommandLine line(std::string(command->name),
-                        std::string(command->summary),
-                        {arguments.begin() + 1, arguments.end()});
-  try {
-    const Result<int> exit_code = command->run(line);
-    if (exit_code) return *exit_code;
-    fmt::print(stderr, "veneer {}: {}\n", command->name, exit_code.error().what);
-    return exit_code_of(exit_code.error());
-  } catch (const std::bad_alloc&) {
-    fmt::print(stderr,
-               "veneer {}: there is not enough memory; close other programs, or crop the data\n",
-               command->name);
-    return kExitFailed;
-  } catch (const CLI::ParseError& error) {
-    return line.app().exit(error) == 0 ? kExitDone : kExitUsage;
-  }
+  return cli::run_command(*command, {arguments.begin() + 1, arguments.end()});
 }

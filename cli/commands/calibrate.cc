@@ -11,6 +11,7 @@
 #include "cli/calibrate/bench_devices.h"
 #include "cli/calibrate/operators.h"
 #include "cli/calibrate/rig_devices.h"
+#include "cli/commands/calibrate_colour.h"
 #include "cli/commands/calibrate_geometry.h"
 #include "cli/commands/commands.h"
 
@@ -120,6 +121,10 @@ nlohmann::ordered_json summary_of(const calibration::WizardOutcome& outcome,
 
 Result<int> run_calibrate(CommandLine& line) {
   if (line.first_argument() == "geometry") return calibrate_geometry(line);
+  if (line.first_argument() == "colour") return calibrate_colour(line);
+  line.app().footer(
+      "veneer calibrate geometry --help  only the geometry, from pictures on disk\n"
+      "veneer calibrate colour --help    only colour models, from readings in a .ti3");
   CalibrateOptions options;
   declare(line.app(), options);
   line.parse();

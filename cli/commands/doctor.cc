@@ -4,8 +4,10 @@
 #include "base/exit_code.h"
 #include "base/parallel.h"
 #include "btf/models/matrix_product.h"
+#include "calibration/instruments/instruments.h"
 #include "cli/commands/commands.h"
 #include "cli/ranks/ranks.h"
+#include "projector/outputs/window/displays.h"
 #include "render/egl_context.h"
 #include "tracking/usb_access.h"
 
@@ -38,6 +40,52 @@ Trackers look_at_trackers() {
   return result;
 }
 
+struct Instruments {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  std::string text;
+};
+
+/// The colorimeters that are plugged in, and what keeps them from being used.
+Instruments look_at_instruments() {
+  Instruments result;
+  const auto connected = calibration::connected_instruments();
+  if (!connected) {
+    result.text = "\ncolorimeter  " + connected.error().what;
+    return result;
+  }
+  for (const calibration::ConnectedInstrument& each : *connected) {
+    result.json.push_back({{"model", each.model},
+                           {"usb_id", each.usb_id},
+                           {"port", each.usb_port},
+                           {"driver", each.driver},
+                           {"remedy", each.remedy}});
+    result.text += fmt::format("\ncolorimeter  {} on usb port {}{}{}",
+                               each.model,
+                               each.usb_port,
+                               each.remedy.empty() ? "" : ": ",
+                               each.remedy);
+  }
+  if (result.text.empty()) result.text = "\ncolorimeter  none on USB";
+  return result;
+}
+
+/// The displays of the desktop; none where there is no desktop, which a daemon does not need.
+nlohmann::ordered_json look_at_displays(std::string& text) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  if (const auto displays = projector::list_displays()) {
+    for (const projector::Display& d : *displays) {
+      json.push_back({{"number", d.number},
+                      {"name", d.name},
+                      {"width", d.width},
+                      {"height", d.height},
+                      {"refresh_hz", d.refresh_hz}});
+      text += fmt::format("\ndisplay  {}: {}, {} x {}", d.number, d.name, d.width, d.height);
+    }
+  }
+  if (text.empty()) text = "\ndisplay  none: no desktop";
+  return json;
+}
+
 }  // namespace
 
 Result<int> run_doctor(CommandLine& line) {
@@ -46,19 +94,26 @@ Result<int> run_doctor(CommandLine& line) {
   const std::string gl = egl ? egl->description() : egl.error().what;
   const std::string blas = btf::blas_description();
   const Trackers trackers = look_at_trackers();
+  const Instruments instruments = look_at_instruments();
+  std::string displays_text;
+  const nlohmann::ordered_json displays = look_at_displays(displays_text);
   line.print({{"gl", gl},
               {"gl_usable", egl.has_value()},
               {"blas", blas},
               {"mpi", mpi_description()},
               {"threads", thread_count()},
-              {"trackers", trackers.json}},
-             fmt::format("OpenGL   {}{}\nBLAS     {}\nMPI      {}\nthreads  {}{}",
+              {"trackers", trackers.json},
+              {"instruments", instruments.json},
+              {"displays", displays}},
+             fmt::format("OpenGL   {}{}\nBLAS     {}\nMPI      {}\nthreads  {}{}{}{}",
                          egl ? "" : "not usable: ",
                          gl,
                          blas,
                          mpi_description(),
                          thread_count(),
-                         trackers.text));
+                         trackers.text,
+                         instruments.text,
+                         displays_text));
   return egl && trackers.all_usable ? kExitDone : kExitFailed;
 }
 

@@ -148,9 +148,10 @@ Result<int> run_verify(CommandLine& line) {
   }
   if (options.run.empty() || options.bench.empty() ||
       (options.set.empty() && options.material.empty())) {
-    return fail(Errc::kInvalidOption,
-                "say what to verify: --profile PROFILE, or --bench BENCH.toml with --run FOLDER and "
-                "--set SET or --material MATERIAL");
+    return fail(
+        Errc::kInvalidOption,
+        "say what to verify: --profile PROFILE, or --bench BENCH.toml with --run FOLDER and "
+        "--set SET or --material MATERIAL");
   }
 
   VENEER_ASSIGN(const RunVerification result, verify_run(options, line.progress()));

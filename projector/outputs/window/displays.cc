@@ -3,6 +3,8 @@
 
 #include <SDL.h>
 
+#include <cstdlib>
+
 #include "projector/outputs/window/internal_sdl.h"
 
 namespace veneer::projector {
@@ -10,6 +12,12 @@ namespace veneer::projector {
 void SdlVideo::End::operator()(const void*) const noexcept { SDL_QuitSubSystem(SDL_INIT_VIDEO); }
 
 Result<SdlVideo> SdlVideo::begin() {
+  // Without either, SDL would draw into nothing, or take a console's screen.
+  if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr)
+    return fail(
+        Errc::kUnavailable,
+        "looking for displays: there is no desktop here; run this in a session that has one "
+        "(DISPLAY or WAYLAND_DISPLAY is set there)");
   // Ctrl-C stays with the program that opens a window.
   SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
   // Else SDL may take over the thread's GL context to copy a window's pixels.

@@ -178,6 +178,10 @@ TEST_F(WindowOutputTest, RefusesWhatItWouldHaveToChange) {
 
 TEST(WindowOutputWithoutADesktop, SaysWhatIsMissing) {
   ::unsetenv("WAYLAND_DISPLAY");
+  ::unsetenv("DISPLAY");
+  const auto none = list_displays();
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, Errc::kUnavailable);
   ::setenv("SDL_VIDEODRIVER", "x11", 1);
   ::setenv("DISPLAY", ":9877", 1);  // nobody listens there
   const auto output = WindowOutput::open(WindowOutputOptions{});
