@@ -7,10 +7,10 @@
 #include <cmath>
 #include <limits>
 
+#include "base/ipt.h"
 #include "base/random.h"
 #include "render/compensation.h"
 #include "render/internal_testing.h"
-#include "base/ipt.h"
 
 namespace veneer::render {
 namespace {

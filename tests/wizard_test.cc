@@ -6,7 +6,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <cstdlib>
 #include <string>
 #include <thread>
 #include <vector>
@@ -182,6 +185,49 @@ TEST_F(WizardTest, VerifyTellsAProfileThatHoldsFromOneThatDoesNot) {
   EXPECT_EQ(other.exit_code, 3) << other.err;
   EXPECT_TRUE(parsed(other)["calibrate_again"]);
   EXPECT_NE(parsed(other)["verdict"].get<std::string>().find("Calibrate again"), std::string::npos);
+}
+
+TEST_F(WizardTest, ColourModelsCanBeFittedToReadingsAlone) {
+  const std::string readings = (at("good") / "readings.ti3").string();
+  const Outcome outcome =
+      run("veneer calibrate colour " + readings + " --json --quiet --icc " + text("alone.icc"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const json found = parsed(outcome);
+  EXPECT_TRUE(found["additive"]);
+  EXPECT_GT(found["held_out"], 5);
+  double best = HUGE_VAL;
+  for (const json& each : found["candidates"])
+    if (each["fitted"]) best = std::min(best, each["de00_mean"].get<double>());
+  EXPECT_LT(best, 0.5);
+  EXPECT_TRUE(fs::exists(at("alone.icc")));
+  ASSERT_TRUE(write_text(at("empty.ti3"), "CTI3\n"));
+  EXPECT_TRUE(fails(run("veneer calibrate colour " + text("empty.ti3")), 1, "empty.ti3"));
+  EXPECT_TRUE(fails(run("veneer calibrate colour"), 2, "readings"));
+}
+
+// Real pictures (../shared/data/procam_graycode/ORIGIN.txt): the figures that are asked for.
+TEST_F(WizardTest, GeometryOfRealPicturesIsFoundAndThePublishedOneHadNotConverged) {
+  const char* data = std::getenv("VENEER_DATA");
+  const fs::path folder = fs::absolute(fs::path(data == nullptr ? "" : data) / "procam_graycode");
+  if (!fs::exists(folder / "capture_3")) GTEST_SKIP() << "real data absent: " << folder;
+  std::string line =
+      "veneer calibrate geometry --json --quiet --board 9x7 --square 75 --projector "
+      "2048x1536 --graycode-step 2 --poses";
+  for (int i = 0; i < 4; ++i) line += " " + (folder / fmt::format("capture_{}", i)).string();
+  line += " --published " + (folder / "calibration_result.xml").string();
+  const Outcome outcome = run(line);
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const json found = parsed(outcome);
+  EXPECT_NEAR(found["camera_rms"], 0.329, 0.01);
+  EXPECT_LE(found["stereo_rms"], 0.41);
+  EXPECT_EQ(found["leave_one_out"].size(), 4U);
+  EXPECT_GE(found["corners_decoded"], 250);
+  ASSERT_TRUE(found.contains("published"));
+  EXPECT_FALSE(found["published"]["converged"]);
+  EXPECT_TRUE(fails(run("veneer calibrate geometry --board 9x7 --square 75 --projector 2048x1536 "
+                        "--poses nowhere"),
+                    1,
+                    "nowhere"));
 }
 
 // Every other bench: what is asked of it, with hidden truths that the wizard is not told.
