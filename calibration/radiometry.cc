@@ -161,7 +161,7 @@ class Measurement {
           session_.show_and_read(Target::kWhiteReference,
                                  centre_,
                                  code,
-                                 1,
+                                 options_.patch_repeats,
                                  fmt::format("{} {}, {}, {}", what, code[0], code[1], code[2])));
       readings.push_back({drive_of_code(code, options_.bits), xyz});
     }
@@ -362,6 +362,7 @@ Status RadiometryOptions::check() const {
   VENEER_TRY(in_range("reference_distance_m", reference_distance_m, 1e-3, 1e3));
   VENEER_TRY(in_range("levels", levels, 4, std::min(40, (1 << bits) - 1)));
   VENEER_TRY(in_range("repeats", repeats, 1, 100));
+  VENEER_TRY(in_range("patch_repeats", patch_repeats, 1, 100));
   VENEER_TRY(in_range("held_out", held_out, 8, 1000));
   VENEER_TRY(in_range("cube", cube, 2, 9));
   VENEER_TRY(in_range("vignetting_columns", vignetting_columns, 2, 100));
@@ -395,9 +396,10 @@ Result<MeasuredProfile> measure_profile(Colorimeter& colorimeter,
   const ColourPatchOptions patches = patch_options(options);
   const int per_target = 5 * options.repeats;  // ambient, black, three channels
   // Those that channels which do not add up need besides are not known yet.
+  const auto listed =
+      static_cast<int>(additivity_patches(patches).size() + ramp_patches(patches).size());
   const int readings =
-      2 * per_target + options.repeats + options.held_out +
-      static_cast<int>(additivity_patches(patches).size() + ramp_patches(patches).size()) +
+      2 * per_target + options.repeats + options.patch_repeats * (options.held_out + listed) +
       (options.known_fall_off.empty() ? 1 + options.vignetting_columns * options.vignetting_rows
                                       : 0);
   progress.start("measuring the projector", readings);

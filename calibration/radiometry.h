@@ -26,6 +26,8 @@ struct RadiometryOptions {
   int levels = 18;
   /// Readings that are averaged for ambient, black and each channel's full drive. 1 to 100.
   int repeats = 4;
+  /// Readings that are averaged for every other patch; more for a noisy instrument. 1 to 100.
+  int patch_repeats = 1;
   /// Patches that no model is fitted to, by which one is chosen. 8 to 1000.
   int held_out = 32;
   /// Nodes along an axis of the cube of mixtures that is read where the channels do not add up; see

@@ -311,6 +311,9 @@ TEST(MeasureProfile, RefusesOptionsOutOfRange) {
   refuses([](auto& o) { o.reference_distance_m = std::nan(""); }, "reference_distance_m");
   refuses([](auto& o) { o.levels = 256; }, "levels");
   refuses([](auto& o) { o.repeats = 0; }, "repeats");
+  refuses([](auto& o) { o.patch_repeats = 0; }, "patch_repeats");
+  refuses([](auto& o) { o.held_out = 7; }, "held_out");
+  refuses([](auto& o) { o.cube = 1; }, "cube");
   refuses([](auto& o) { o.vignetting_columns = 1; }, "vignetting_columns");
   refuses([](auto& o) { o.vignetting_rows = 101; }, "vignetting_rows");
 }

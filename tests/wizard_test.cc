@@ -258,5 +258,22 @@ TEST_F(WizardTest, MeetsItsGatesOnEveryBench) {
   }
 }
 
+// Two in a hundred of scatter: read more often, and judged by what such an instrument can tell.
+TEST_F(WizardTest, ANoisyInstrumentHasAGateOfItsOwn) {
+  const std::string bench = VENEER_ETC "/benches/noisy-instrument.toml";
+  const Outcome made = run(calibrate(bench, at("noisy")));
+  ASSERT_EQ(made.exit_code, 0) << made.out << made.err;
+  EXPECT_TRUE(parsed(made)["additive"]);
+  EXPECT_LE(parsed(made)["fitted_patches"], 64);
+  EXPECT_GT(parsed(made)["readings"], 1500);
+  const Outcome outcome =
+      run("veneer verify --json --quiet --profile " + text("noisy") + " --bench " + bench);
+  const json v = parsed(outcome);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.out;
+  EXPECT_NEAR(v["relative_noise"], 0.02, 0.002);
+  EXPECT_GT(v["gates"][0], 0.5);
+  EXPECT_LT(v["gates"][0], 1.5);  // not so wide that anything would pass
+}
+
 }  // namespace
 }  // namespace veneer

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+
 #include "calibration/wizard/step.h"
 
 namespace veneer::calibration {
@@ -6,6 +9,16 @@ namespace {
 
 /// Along each side of the picture, where a person has to point the instrument at each.
 constexpr int kSpotsByHand = 3;
+/// Scatter of a reading that may go into a fit; an instrument with more is read more often, up to
+/// kMostRepeats times, which takes a quarter of an hour.
+constexpr double kScatter = 0.004;
+constexpr int kMostRepeats = 16;
+
+/// Readings whose mean scatters by no more than kScatter, if so many are bearable.
+int repeats_for(double relative_scatter) {
+  const double wanted = std::pow(relative_scatter / kScatter, 2);
+  return wanted >= kMostRepeats ? kMostRepeats : std::max(1, static_cast<int>(std::lround(wanted)));
+}
 
 }  // namespace
 
@@ -21,6 +34,14 @@ Result<Answer> measure_light(StepContext& context) {
   }
   RadiometryOptions options = context.options.radiometry;
   options.bits = context.devices.bits;
+  options.patch_repeats = repeats_for(results.white.relative);
+  options.repeats = std::max(options.repeats, options.patch_repeats);
+  if (options.patch_repeats > 1)
+    context.find({Finding::Severity::kNote,
+                  fmt::format("a reading scatters by {:.1f} %, so each patch is read {} times",
+                              100 * results.white.relative,
+                              options.patch_repeats),
+                  ""});
   if (!context.devices.aims_itself) {
     options.vignetting_columns = kSpotsByHand;
     options.vignetting_rows = kSpotsByHand;
