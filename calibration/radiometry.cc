@@ -60,6 +60,7 @@ class Measurement {
     result_.profile.geometry = geometry;
     result_.profile.bits = options.bits;
     result_.profile.reference_distance_m = options.reference_distance_m;
+    result_.patch_repeats = options.patch_repeats;
   }
 
   Result<MeasuredProfile> run() {

@@ -52,6 +52,7 @@ struct MeasuredProfile {
   std::string choice;
   ColourError held_out;    ///< of the chosen model, on patches that it was not fitted to
   int fitted_patches = 0;  ///< different drives
+  int patch_repeats = 1;   ///< readings that each of `patches` is the mean of
   /// Of the white board at the raster's centre, in the order of reading; ambient and black in them.
   std::vector<PatchReading> patches;
   Xyz black = Xyz::Zero();  ///< what drive 0 reads among them

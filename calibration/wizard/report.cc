@@ -115,7 +115,33 @@ ordered_json geometry_of(const WizardResults& results) {
   return json;
 }
 
-ordered_json light_of(const MeasuredProfile& measured) {
+/// The levels of each channel's ramp as they were read: drive, output, its standard deviation by
+/// the scatter of bright and of dark readings.
+ordered_json ramp_points(const MeasuredProfile& measured, const WizardResults& results) {
+  ordered_json channels = ordered_json::array();
+  for (int c = 0; c < 3; ++c) {
+    ordered_json points = ordered_json::array();
+    // In the readings' own units: the profile's are those of a board that faces the lens.
+    Xyz full = Xyz::Zero();
+    for (const PatchReading& patch : measured.patches) {
+      if (patch.drive[c] == 1.0 && (patch.drive.array() > 0).count() == 1)
+        full = patch.xyz - measured.black;
+    }
+    for (const PatchReading& patch : measured.patches) {
+      if (!(patch.drive[c] > 0) || (patch.drive.array() > 0).count() != 1 || full.isZero())
+        continue;
+      const double output = (patch.xyz - measured.black).dot(full) / full.squaredNorm();
+      const double dark = results.ambient.deviation.norm() / full.norm();
+      const double deviation = std::hypot(results.white.relative * output, dark) /
+                               std::sqrt(static_cast<double>(measured.patch_repeats));
+      points.push_back({patch.drive[c], output, deviation});
+    }
+    channels.push_back(std::move(points));
+  }
+  return channels;
+}
+
+ordered_json light_of(const MeasuredProfile& measured, const WizardResults& results) {
   const ProjectorProfile& profile = measured.profile;
   const Xyz white = profile.white();
   ordered_json json{{"readings", measured.readings},
@@ -152,6 +178,7 @@ ordered_json light_of(const MeasuredProfile& measured) {
     }
     json["tone_curves"].push_back(std::move(points));
   }
+  json["ramp_points"] = ramp_points(measured, results);
   json["gamut"] = {{"primaries", ordered_json::array()}, {"white", chromaticity(white)}};
   for (int c = 0; c < 3; ++c) {
     const Xyz primary = profile.primaries.col(c);
@@ -224,7 +251,7 @@ ordered_json report_of(const WizardResults& results,
                       {"rms_mm", 1e3 * results.object->rms_m},
                       {"held_out_mm", 1e3 * results.object->held_out_m}};
   }
-  if (results.measured) json["light"] = light_of(*results.measured);
+  if (results.measured) json["light"] = light_of(*results.measured, results);
   if (results.verification) json["proof"] = proof_of(*results.verification);
   return json;
 }
