@@ -12,6 +12,7 @@
 
 #include "calibration/colour/baking.h"
 #include "calibration/colour/colour_patches.h"
+#include "calibration/colour/ramps.h"
 #include "calibration/internal_reading_session.h"
 #include "calibration/spot_fall_off.h"
 
@@ -21,8 +22,6 @@ namespace {
 constexpr std::array<std::string_view, 3> kChannelNames{"red", "green", "blue"};
 /// Under this part of the strongest channel's light a channel counts as dead.
 constexpr double kLeastChannel = 1e-3;
-/// How far a ramp may fall, in parts of full output: more than any instrument's noise.
-constexpr double kLargestFall = 0.02;
 constexpr double kLargestAmbientMismatch = 0.1;
 constexpr double kLargestLampDrift = 0.01;
 
@@ -215,17 +214,6 @@ class Measurement {
     result_.fitted_patches = static_cast<int>(different.size());
     set_colour_drift(fitted);
     return {};
-  }
-
-  [[nodiscard]] static Xyz mean_black(const std::vector<PatchReading>& readings) {
-    Xyz sum = Xyz::Zero();
-    int count = 0;
-    for (const PatchReading& each : readings) {
-      if (!each.drive.isZero()) continue;
-      sum += each.xyz;
-      ++count;
-    }
-    return count > 0 ? Xyz(sum / count) : sum;
   }
 
   /// The readings of one channel alone above black, by drive.

@@ -7,6 +7,7 @@
 #include "base/random.h"
 #include "calibration/colour/colour_patches.h"
 #include "calibration/colour/ladder.h"
+#include "calibration/colour/ramps.h"
 
 namespace veneer::calibration {
 

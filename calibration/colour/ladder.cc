@@ -10,6 +10,7 @@
 #include "base/random.h"
 #include "calibration/colour/additivity.h"
 #include "calibration/colour/colour_patches.h"
+#include "calibration/colour/ramps.h"
 
 namespace veneer::calibration {
 namespace {
@@ -89,17 +90,6 @@ std::vector<PatchReading> LadderProjector::read(std::span<const Rgb16> patches,
     readings.push_back({drive, light(drive).cwiseProduct(Xyz::Ones() + noise * error)});
   }
   return readings;
-}
-
-Xyz mean_black(std::span<const PatchReading> readings) {
-  Xyz sum = Xyz::Zero();
-  int count = 0;
-  for (const PatchReading& reading : readings) {
-    if (!reading.drive.isZero(0.0)) continue;
-    sum += reading.xyz;
-    ++count;
-  }
-  return count > 0 ? Xyz(sum / count) : sum;
 }
 
 std::span<const LadderRung> ladder_rungs() {

@@ -47,9 +47,6 @@ class LadderProjector {
   LadderDefects defects_;
 };
 
-/// The mean of the readings at drive 0; zero where there is none.
-[[nodiscard]] Xyz mean_black(std::span<const PatchReading> readings);
-
 /// A rung: one projector, measured with so many patches.
 struct LadderRung {
   std::string_view defect;

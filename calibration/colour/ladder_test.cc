@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "calibration/colour/internal_testing.h"
+#include "calibration/colour/ramps.h"
 
 namespace veneer::calibration {
 namespace {

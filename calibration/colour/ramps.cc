@@ -117,6 +117,17 @@ void make_rising(ChannelRamp& ramp) {
 
 }  // namespace
 
+Xyz mean_black(std::span<const PatchReading> readings) {
+  Xyz sum = Xyz::Zero();
+  int count = 0;
+  for (const PatchReading& reading : readings) {
+    if (!reading.drive.isZero(0.0)) continue;
+    sum += reading.xyz;
+    ++count;
+  }
+  return count > 0 ? Xyz(sum / count) : sum;
+}
+
 Result<ChannelRamps> read_ramps(std::span<const PatchReading> patches, const Xyz& black) {
   VENEER_TRY(check_patches(patches, black));
   const std::map<DriveKey, Average> averages = averages_of(patches);

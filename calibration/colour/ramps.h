@@ -12,6 +12,9 @@
 
 namespace veneer::calibration {
 
+/// The mean of the readings at drive 0; zero where there is none.
+[[nodiscard]] Xyz mean_black(std::span<const PatchReading> readings);
+
 /// What one channel alone sends, above black.
 struct ChannelRamp {
   /// Rising, from 0 to 1.

@@ -3,10 +3,12 @@
 
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "base/exit_code.h"
 #include "calibration/colour/baking.h"
+#include "calibration/colour/ramps.h"
 #include "calibration/colour/selection.h"
 #include "calibration/exchange/cgats.h"
 #include "calibration/exchange/icc.h"
@@ -36,20 +38,6 @@ Split split(const std::vector<PatchReading>& readings) {
     (out ? result.held_out : result.fitted).push_back(reading);
   }
   return result;
-}
-
-Result<Xyz> mean_black(const std::vector<PatchReading>& readings) {
-  Xyz sum = Xyz::Zero();
-  int count = 0;
-  for (const PatchReading& reading : readings) {
-    if (!reading.drive.isZero()) continue;
-    sum += reading.xyz;
-    ++count;
-  }
-  if (count == 0)
-    return fail(Errc::kBadFormat,
-                "fitting colour models: black was not read; measure it, better several times");
-  return Xyz(sum / count);
 }
 
 ordered_json json_of(const calibration::ColourCandidate& candidate) {
@@ -82,7 +70,11 @@ Result<int> calibrate_colour(CommandLine& line) {
   line.parse();
 
   VENEER_ASSIGN(const calibration::MeasuredPatches measured, calibration::read_ti3(readings_path));
-  VENEER_ASSIGN(const Xyz black, mean_black(measured.patches));
+  const auto is_black = [](const PatchReading& reading) { return reading.drive.isZero(0); };
+  if (std::ranges::none_of(measured.patches, is_black))
+    return fail(Errc::kBadFormat,
+                "fitting colour models: black was not read; measure it, better several times");
+  const Xyz black = calibration::mean_black(measured.patches);
   Split parts{measured.patches, {}};
   if (held_out_path.empty()) {
     parts = split(measured.patches);
