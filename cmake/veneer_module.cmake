@@ -51,7 +51,7 @@ function(veneer_add_bus_test name)
   add_dependencies(veneer_tests veneer_${name}_test)
   add_test(NAME ${name} COMMAND ${UMOCKDEV_WRAPPER} $<TARGET_FILE:veneer_${name}_test>)
   set_tests_properties(${name} PROPERTIES
-    SKIP_RETURN_CODE 77
+    SKIP_RETURN_CODE 77 RUN_SERIAL TRUE
     ENVIRONMENT "GTEST_OUTPUT=xml:${CMAKE_BINARY_DIR}/test-results/${name}.xml;ASAN_OPTIONS=verify_asan_link_order=0:detect_leaks=0")
 endfunction()
 
