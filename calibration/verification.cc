@@ -19,10 +19,9 @@ double difference(const Xyz& a, const Xyz& b, const Xyz& white) {
   return delta_e_2000(lab_from_xyz(a, white), lab_from_xyz(b, white));
 }
 
-/// Sums of squares of the repeats' deviations from their mean, as parts of the white's components
-/// so that dark patches are not blown up.
+/// Of the repeats about their mean, as parts of it.
 struct Scatter {
-  double squares = 0;  // of (x - mean) / mean, over patches that are not dark
+  double squares = 0;  // of (x - mean) / mean, over components that are not dark
   int degrees = 0;     // of freedom
 };
 
@@ -47,9 +46,13 @@ class Verification {
     }
     // A dark reading's scatter is mostly the instrument's own floor and no part of its value.
     if (mean_reading.y() > 0.02 * result_.white.y()) {
-      for (const Xyz& reading : readings)
-        scatter_.squares += (reading - mean_reading).cwiseQuotient(mean_reading).squaredNorm();
-      scatter_.degrees += 3 * (options_.repeats - 1);
+      for (int k = 0; k < 3; ++k) {
+        // Saturated colours may have next to nothing of one component.
+        if (!(mean_reading[k] > 0.02 * result_.white[k])) continue;
+        for (const Xyz& reading : readings)
+          scatter_.squares += std::pow(reading[k] / mean_reading[k] - 1, 2);
+        scatter_.degrees += options_.repeats - 1;
+      }
     }
     VerifiedPatch verified{
         patch, mean_reading, predict_reading(profile_, patch.target, patch.pixel, patch.code), 0};

@@ -168,6 +168,26 @@ TEST_F(WizardTest, StepsCanBeLeftOut) {
   EXPECT_FALSE(fs::exists(at("x")));
 }
 
+TEST_F(WizardTest, WithoutAProfileTheSessionIsKept) {
+  const std::string line =
+      calibrate(kBench, at("kept")) + " --skip geometry warm-up object --geometry " + text("good");
+  const Outcome first = run(line + " publish");  // CLI11 takes it as one more step to skip
+  EXPECT_EQ(first.exit_code, 2) << "a stray word is no option";
+  const Outcome outcome = run(calibrate(kBench, at("kept")) +
+                              " --skip geometry warm-up object publish --geometry " + text("good"));
+  EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
+  EXPECT_FALSE(parsed(outcome)["finished"]);
+  EXPECT_FALSE(fs::exists(at("kept")));
+  ASSERT_TRUE(fs::exists(at("kept.session")));
+  // Somebody else's file in the session's folder outlives it.
+  ASSERT_TRUE(write_text(at("kept.session") / "notes.txt", "mine"));
+  const Outcome second = run(line);
+  ASSERT_EQ(second.exit_code, 0) << second.err;
+  EXPECT_EQ(parsed(second)["readings"], 0) << "all was there already";
+  EXPECT_TRUE(fs::exists(at("kept.session") / "notes.txt"));
+  EXPECT_FALSE(fs::exists(at("kept.session") / "journal.jsonl"));
+}
+
 TEST_F(WizardTest, VerifyTellsAProfileThatHoldsFromOneThatDoesNot) {
   const std::string verify =
       "veneer verify --json --quiet --profile " + text("good") + " --bench " VENEER_ETC "/benches/";

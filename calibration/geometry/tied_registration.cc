@@ -253,7 +253,7 @@ Result<TiedRegistration> tie_registration(std::span<const View> views,
   for (std::size_t i = 0; i < views.size(); ++i)
     if (start.inlier[i]) used.push_back(i);
   if (used.size() < kLeastPoses)
-    return fail(Errc::kInvalidOption,
+    return fail(Errc::kBadFormat,
                 "tying the registration to the pixels: {} poses; at least {} are needed",
                 used.size(),
                 kLeastPoses);

@@ -44,8 +44,8 @@ struct TiedRegistration {
 /// @param sensors  world_from_sensor of the same poses, with their deviations.
 /// @param start  of the same poses; what it calls outliers is left out.
 /// @param touches  may be none.
-/// Errors: kInvalidOption (options; numbers of poses that differ; fewer than 4 inliers), kBadFormat
-/// (no point in front of the projector, or no convergence).
+/// Errors: kInvalidOption (options; numbers of poses that differ), kBadFormat (fewer than 4
+/// inliers; no point in front of the projector, or no convergence).
 [[nodiscard]] Result<TiedRegistration> tie_registration(
     std::span<const View> views,
     std::span<const tracking::SynchronisedPose> sensors,

@@ -16,6 +16,8 @@ class AimedColorimeter final : public Colorimeter {
   AimedColorimeter(Colorimeter& instrument, Operator& hands)
       : instrument_(instrument), hands_(hands) {}
   [[nodiscard]] std::string description() const override { return instrument_.description(); }
+  /// Asks anew for the next reading: something may have been moved.
+  void forget_aim() { aim_.reset(); }
   /// Errors: also kCancelled (it was not pointed there).
   [[nodiscard]] Result<Xyz> read(Target target, const Eigen::Vector2d& pixel) override;
 

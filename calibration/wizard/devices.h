@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -46,6 +47,8 @@ struct Devices {
   capture::Camera* camera = nullptr;  ///< null: geometry comes from elsewhere
   PoseProbe* board_sensor = nullptr;  ///< null: nothing tracks the board
   PointProbe* stylus = nullptr;       ///< null: nothing can be touched
+  /// Called when a step begins, and after one failed: what was moved meanwhile is not where it was.
+  std::function<void()> begin_step;
   /// Whether the instrument gets to any spot by itself; else a person points it, and is asked for
   /// as few spots as will do.
   bool aims_itself = false;

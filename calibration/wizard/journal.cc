@@ -31,7 +31,9 @@ std::string difference(const json& there, const json& here) {
 
 }  // namespace
 
-Result<Journal> Journal::open(const std::filesystem::path& folder, const json& identity) {
+Result<Journal> Journal::open(const std::filesystem::path& folder,
+                              const json& identity,
+                              bool restart) {
   const std::filesystem::path path = folder / "journal.jsonl";
   const std::string doing = fmt::format("opening the session {}", folder.string());
   std::error_code error;
@@ -44,6 +46,8 @@ Result<Journal> Journal::open(const std::filesystem::path& folder, const json& i
                 "{}: another program is calibrating in it; let that one finish, or name another "
                 "session with --session",
                 doing);
+  if (restart && ::ftruncate(fd.value(), 0) != 0)
+    return fail(Errc::kIo, "{}: forgetting what was found: {}", doing, system_message());
   VENEER_ASSIGN(const std::string text, read_text(path));
   Journal journal(path, std::move(fd));
   if (const Status taken = journal.take(text, identity); !taken)

@@ -22,10 +22,12 @@ class Journal {
   /// Opens `folder`/journal.jsonl or begins it. A line that was cut off at its end, as by a power
   /// loss, is dropped.
   /// @param identity  what must be the same for the findings to hold: devices, raster, options.
+  /// @param restart  forgets all that is there, once no other program has it open.
   /// Errors: kBadFormat (a journal of another Veneer, a damaged one), kInvalidOption (of another
   /// identity, says what differs), kUnavailable (another program has it open), kIo.
   [[nodiscard]] static Result<Journal> open(const std::filesystem::path& folder,
-                                            const nlohmann::json& identity);
+                                            const nlohmann::json& identity,
+                                            bool restart = false);
 
   /// Nothing where it is not known.
   [[nodiscard]] const nlohmann::json* find(const std::string& step, const std::string& key) const;

@@ -41,7 +41,7 @@ Status OutputPatchDisplay::cover(bool covered) {
                                       0,
                                       "Cover the projector's lens, so that only the room's "
                                       "light is left."}
-                            : Request{Task::kUncoverLens, 0, "Uncover the lens."}));
+                            : Request{Task::kUncoverLens, 0, "See that the lens is uncovered."}));
   if (answer != Answer::kDone)
     return fail(Errc::kCancelled,
                 "{} the lens was refused; what follows would be wrong",

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "base/clock.h"
 #include "base/image.h"
@@ -44,7 +45,7 @@ class OutputPatchDisplay final : public PatchDisplay {
   Options options_;
   Image<Rgb16> picture_;
   std::uint64_t frames_ = 0;
-  bool covered_ = false;
+  std::optional<bool> covered_;  // not known when a session is resumed
 };
 
 }  // namespace veneer::calibration

@@ -53,7 +53,8 @@ TEST(OutputPatchDisplay, AsksForTheCoverOnceEachTime) {
   ASSERT_TRUE(shown.display.show({0, 0, 0}, false));
   ASSERT_TRUE(shown.display.show({0, 0, 0}, false));
   ASSERT_TRUE(shown.display.show({9, 9, 9}));
-  EXPECT_EQ(shown.hands.asked, (std::vector<Task>{Task::kCoverLens, Task::kUncoverLens}));
+  EXPECT_EQ(shown.hands.asked,
+            (std::vector<Task>{Task::kUncoverLens, Task::kCoverLens, Task::kUncoverLens}));
   EXPECT_EQ(shown.output.corners.front(), (Rgb16{1, 2, 3}));
   EXPECT_EQ(shown.output.numbers, (std::vector<std::uint64_t>{0, 1, 2, 3}));
   EXPECT_EQ(shown.clock.now().time_since_epoch(), std::chrono::seconds(1));  // four times settled

@@ -36,6 +36,7 @@ struct Landmark {
 struct WizardOptions {
   std::filesystem::path profile;  ///< the folder to write
   std::filesystem::path session;  ///< the folder of what was found out so far
+  bool restart = false;           ///< forget what an earlier run of the session found
   /// Steps that are left out.
   std::set<std::string> skip;
   /// A geometry that is taken over where there is no camera, or `geometry` is skipped.

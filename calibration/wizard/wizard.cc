@@ -67,11 +67,14 @@ Status failure_in(const StepReport& report) {
   return {};
 }
 
-/// What the journal must forget for a step to be done anew: itself and all that stand on it.
-Status forget_from(Journal& journal, std::size_t step) {
-  for (std::size_t i = step; i < kSteps.size(); ++i)
-    VENEER_TRY(journal.forget(std::string(kSteps[i].name)));
-  return {};
+/// Whether a step was left out the last time: by the user, or since what it needs is not there.
+bool was_left_out(const WizardOptions& options,
+                  const std::vector<StepReport>& reports,
+                  std::string_view name) {
+  return options.skip.contains(std::string(name)) ||
+         std::ranges::any_of(reports, [name](const StepReport& report) {
+           return report.name == name && report.skipped;
+         });
 }
 
 }  // namespace
@@ -93,6 +96,13 @@ Status WizardOptions::check() const {
                   name,
                   known);
     }
+  }
+  std::set<std::string> names;
+  for (const Landmark& landmark : landmarks) {
+    if (!names.insert(landmark.name).second)
+      return fail(Errc::kInvalidOption,
+                  "calibrating: two landmarks are called \"{}\"; give each a name of its own",
+                  landmark.name);
   }
   VENEER_TRY(radiometry.check());
   if (!known_geometry && !skip.contains("geometry")) VENEER_TRY(board.check());
@@ -126,7 +136,13 @@ Result<WizardOutcome> run_wizard(const WizardOptions& options,
   VENEER_TRY(options.check());
   VENEER_CHECK(devices.display != nullptr && devices.colorimeter != nullptr &&
                devices.hands != nullptr && devices.clock != nullptr);
-  VENEER_ASSIGN(Journal journal, Journal::open(options.session, identity_of(options, devices)));
+  if (devices.camera == nullptr && !options.known_geometry && !options.skip.contains("light"))
+    return fail(
+        Errc::kInvalidOption,
+        "calibrating: there is no camera; take the geometry of an earlier profile over with "
+        "--geometry");
+  VENEER_ASSIGN(Journal journal,
+                Journal::open(options.session, identity_of(options, devices), options.restart));
   RecordedDevices recorded(*devices.display, *devices.colorimeter, journal);
   if (journal.resumed())
     devices.hands->say(fmt::format("Going on with the session {}: {} findings are there already.",
@@ -134,6 +150,7 @@ Result<WizardOutcome> run_wizard(const WizardOptions& options,
                                    journal.size()));
   WizardOutcome outcome;
   std::size_t step = 0;
+  std::string failed_before;  // what the last try of this step ended with
   while (step < kSteps.size()) {
     const Step& current = kSteps[step];
     const std::string name(current.name);
@@ -148,6 +165,7 @@ Result<WizardOutcome> run_wizard(const WizardOptions& options,
     devices.hands->say(
         fmt::format("\n[{}/{}] {}. {}", step + 1, kSteps.size(), current.title, current.about));
     recorded.begin(name);
+    if (devices.begin_step) devices.begin_step();
     StepContext context{
         options, devices, journal, recorded, progress, outcome.results, report, outcome.reports};
     Result<Answer> answer = current.run(context);
@@ -158,14 +176,22 @@ Result<WizardOutcome> run_wizard(const WizardOptions& options,
     if (!answer) {
       const Error why{answer.error().code,
                       fmt::format("{}: {}", current.title, answer.error().what)};
+      if (devices.begin_step) devices.begin_step();
+      // Tried again, a step recalls what it had found, so that an unplugged instrument costs
+      // nothing. Where it then fails just as before, what it recalls is what is wrong.
+      if (failed_before == why.what) {
+        failed_before.clear();
+        VENEER_TRY(journal.forget(name));
+        continue;
+      }
       VENEER_ASSIGN(answer, devices.hands->after_failure(name, why));
       if (*answer == Answer::kQuit) return tl::unexpected(why);
-      // Findings that make no sense are not to be recalled; those up to a device's failure are.
       if (*answer == Answer::kAgain) {
-        if (why.code == Errc::kBadFormat) VENEER_TRY(forget_from(journal, step));
+        failed_before = why.what;
         continue;
       }
     }
+    failed_before.clear();
     switch (*answer) {
       case Answer::kDone:
         if (!report.summary.empty()) devices.hands->say("  " + report.summary);
@@ -179,23 +205,35 @@ Result<WizardOutcome> run_wizard(const WizardOptions& options,
         ++step;
         break;
       case Answer::kAgain:
-        VENEER_TRY(forget_from(journal, step));
+        VENEER_TRY(journal.forget(name));
         break;
-      case Answer::kBack:
-        if (step > 0) --step;
-        VENEER_TRY(forget_from(journal, step));
+      case Answer::kBack: {
+        // Readings of other steps stay: they are what was measured, whatever is made of them.
+        std::size_t before = step;
+        while (before > 0) {
+          --before;
+          if (!was_left_out(options, outcome.reports, kSteps[before].name)) break;
+        }
+        if (before == step || was_left_out(options, outcome.reports, kSteps[before].name)) {
+          devices.hands->say("  There is no step before this one.");
+          break;
+        }
+        step = before;
+        VENEER_TRY(journal.forget(std::string(kSteps[step].name)));
         std::erase_if(outcome.reports, [&](const StepReport& each) {
           return std::ranges::any_of(std::span(kSteps).subspan(step),
                                      [&](const Step& later) { return later.name == each.name; });
         });
         break;
+      }
       case Answer::kQuit:
         outcome.readings_taken = recorded.taken();
         outcome.readings_recalled = recorded.recalled();
         return outcome;
     }
   }
-  outcome.finished = true;
+  // Without a profile on the disk the session is all that there is.
+  outcome.finished = !was_left_out(options, outcome.reports, kSteps.back().name);
   outcome.readings_taken = recorded.taken();
   outcome.readings_recalled = recorded.recalled();
   return outcome;

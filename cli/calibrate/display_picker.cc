@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <iostream>
 #include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "projector/outputs/window/window_output.h"
@@ -61,24 +63,38 @@ Image<Rgb16> number_picture(int number, int width, int height) {
 
 Result<int> pick_display() {
   VENEER_ASSIGN(const std::vector<projector::Display> displays, projector::list_displays());
-  std::vector<std::unique_ptr<projector::WindowOutput>> windows;
-  for (const projector::Display& display : displays) {
-    VENEER_ASSIGN(std::unique_ptr<projector::WindowOutput> window,
-                  projector::WindowOutput::open(
-                      projector::WindowOutputOptions{display.number, /*fullscreen=*/true}));
-    const Image<Rgb16> picture = number_picture(display.number, display.width, display.height);
-    projector::Frame frame;
-    frame.codes = picture.view();
-    VENEER_TRY(window->present(frame));
-    windows.push_back(std::move(window));
+  for (const projector::Display& display : displays)
     fmt::print(stderr,
                "  {}: {} ({} x {})\n",
                display.number,
                display.name,
                display.width,
                display.height);
+  fmt::print(stderr, "Each display shows its number for a few seconds.\n");
+  {
+    std::vector<std::unique_ptr<projector::WindowOutput>> windows;
+    std::vector<Image<Rgb16>> pictures;
+    for (const projector::Display& display : displays) {
+      VENEER_ASSIGN(std::unique_ptr<projector::WindowOutput> window,
+                    projector::WindowOutput::open(
+                        projector::WindowOutputOptions{display.number, /*fullscreen=*/true}));
+      windows.push_back(std::move(window));
+      pictures.push_back(number_picture(display.number, display.width, display.height));
+    }
+    // Again and again: a window may appear late, and the system wants to see that it lives.
+    constexpr int kPictures = 40;
+    constexpr std::chrono::milliseconds kPause{100};
+    for (int i = 0; i < kPictures; ++i) {
+      for (std::size_t k = 0; k < windows.size(); ++k) {
+        projector::Frame frame;
+        frame.codes = pictures[k].view();
+        VENEER_TRY(windows[k]->present(frame));
+      }
+      std::this_thread::sleep_for(kPause);
+    }
   }
-  fmt::print(stderr, "Each display shows its number. Which one is the projector? ");
+  // The windows are gone: they may have covered the terminal.
+  fmt::print(stderr, "Which one is the projector? ");
   std::string line;
   std::getline(std::cin, line);
   for (const projector::Display& display : displays) {

@@ -131,6 +131,7 @@ calibration::Devices RigDevices::devices() {
   devices.colorimeter = &*aimed_;
   devices.hands = &hands_;
   devices.clock = &clock_;
+  devices.begin_step = [this] { aimed_->forget_aim(); };
   devices.board_sensor = board_sensor_ ? &*board_sensor_ : nullptr;
   devices.stylus = stylus_ ? &*stylus_ : nullptr;
   devices.width = width_;

@@ -25,7 +25,6 @@ struct CalibrateOptions {
   fs::path rig;
   fs::path geometry;  // an earlier profile
   bool yes = false;
-  bool restart = false;
   std::vector<std::string> skip;
   calibration::WizardOptions wizard;
 };
@@ -45,7 +44,8 @@ void declare(CLI::App& app, CalibrateOptions& options) {
       options.wizard.session,
       "Where findings are kept until the profile is written (default: the profile's name "
       "and \".session\")");
-  app.add_flag("--restart", options.restart, "Forget what an earlier run of the session found");
+  app.add_flag(
+      "--restart", options.wizard.restart, "Forget what an earlier run of the session found");
   app.add_option("--skip", options.skip, "Leave a step out: " + steps);
   app.add_option("--geometry",
                  options.geometry,
@@ -75,9 +75,6 @@ Status prepare(CalibrateOptions& options) {
                   calibration::ProjectorProfile::load(options.geometry));
     wizard.known_geometry = earlier.geometry;
   }
-  std::error_code error;
-  if (options.restart) fs::remove(wizard.session / "journal.jsonl", error);
-  if (error) return fail(Errc::kIo, "forgetting {}: {}", wizard.session.string(), error.message());
   return {};
 }
 
@@ -160,14 +157,15 @@ Result<int> run_calibrate(CommandLine& line) {
                 options.wizard.session.string());
   if (!outcome->finished) {
     line.print(summary_of(*outcome, options),
-               fmt::format("stopped; what was found is kept in {}: the same command goes on from "
-                           "there",
+               fmt::format("no profile was written; what was found is kept in {}: the same command "
+                           "goes on from there",
                            options.wizard.session.string()));
     return kExitFailed;
   }
   // The next calibration begins anew; what this one read is in the profile's folder.
   std::error_code ignored;
-  fs::remove_all(options.wizard.session, ignored);
+  fs::remove(options.wizard.session / "journal.jsonl", ignored);
+  fs::remove(options.wizard.session, ignored);  // if there is nothing of somebody else's in it
   const nlohmann::ordered_json summary = summary_of(*outcome, options);
   const bool good = summary.value("good", true);
   line.print(summary,

@@ -24,13 +24,15 @@ json to_json(const std::vector<Eigen::Vector2d>& points) {
   return list;
 }
 
+/// NaN is null in JSON.
+double number_from(const json& value) {
+  return value.is_number() ? value.get<double>() : std::nan("");
+}
+
 std::vector<Eigen::Vector2d> points_from(const json& list) {
   std::vector<Eigen::Vector2d> points;
   for (const json& p : list) {
-    const auto value = [&p](std::size_t i) {
-      return p.at(i).is_number() ? p.at(i).get<double>() : std::nan("");  // NaN is null in JSON
-    };
-    points.emplace_back(value(0), value(1));
+    points.emplace_back(number_from(p.at(0)), number_from(p.at(1)));
   }
   return points;
 }
@@ -67,9 +69,9 @@ Pose pose_from(const json& value, const geometry::Board& board, const std::strin
       name, board.corners(), points_from(value.at("camera")), points_from(value.at("projector"))};
   pose.view.corners = static_cast<int>(pose.view.view.x_in_object.size());
   value.at("corners_decoded").get_to(pose.view.corners_decoded);
-  value.at("corner_decoded_ratio").get_to(pose.view.corner_decoded_ratio);
-  value.at("homography_rms_px").get_to(pose.view.homography_rms_px);
-  value.at("decoded_ratio").get_to(pose.view.decoded_ratio);
+  pose.view.corner_decoded_ratio = number_from(value.at("corner_decoded_ratio"));
+  pose.view.homography_rms_px = number_from(value.at("homography_rms_px"));
+  pose.view.decoded_ratio = number_from(value.at("decoded_ratio"));
   if (value.contains("sensor")) {
     const json& sensor = value["sensor"];
     const auto q = sensor.at("rotation_wxyz").get<std::array<double, 4>>();
@@ -309,6 +311,8 @@ Status tie_to_tracker(StepContext& context) {
 
 Result<Answer> find_geometry(StepContext& context) {
   WizardResults& results = context.results;
+  results.geometry.reset();
+  results.projector.reset();
   if (context.devices.camera == nullptr) {
     if (!context.options.known_geometry)
       return fail(Errc::kUnavailable,

@@ -24,6 +24,8 @@ int repeats_for(double relative_scatter) {
 
 Result<Answer> measure_light(StepContext& context) {
   WizardResults& results = context.results;
+  results.measured.reset();
+  results.verification.reset();
   if (!results.projector) {
     if (!context.options.known_geometry)
       return fail(

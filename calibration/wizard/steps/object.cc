@@ -67,7 +67,15 @@ Result<Answer> touch_landmarks(StepContext& context) {
     if (answer != Answer::kDone) return answer;
     if (point) pairs.push_back({landmark.in_object, point->x_in_world, point->deviation_m});
   }
-  if (pairs.size() < kLeastTouches) return Answer::kDone;
+  if (pairs.size() < kLeastTouches) {
+    if (!pairs.empty())
+      context.find({Finding::Severity::kNote,
+                    fmt::format("only {} landmarks were touched; {} are needed to place the object",
+                                pairs.size(),
+                                kLeastTouches),
+                    ""});
+    return Answer::kDone;
+  }
   VENEER_ASSIGN(context.results.object, geometry::register_points(pairs));
   for (const std::string& warning : context.results.object->warnings)
     context.find({Finding::Severity::kNote, warning, ""});
@@ -122,10 +130,15 @@ Result<Answer> touch_cross_hairs(StepContext& context) {
     if (point) results.cross_hairs.push_back({pixel, point->x_in_world, point->deviation_m});
   }
   if (results.cross_hairs.size() < kLeastTouches) {
+    if (!results.cross_hairs.empty())
+      context.find({Finding::Severity::kNote,
+                    fmt::format("only {} cross-hairs were touched; {} are needed to be of use",
+                                results.cross_hairs.size(),
+                                kLeastTouches),
+                    ""});
     results.cross_hairs.clear();
-    return Answer::kDone;
   }
-  VENEER_TRY(tie_to_tracker(context));
+  VENEER_TRY(tie_to_tracker(context));  // without any it goes by the board alone
   return Answer::kDone;
 }
 

@@ -5,6 +5,7 @@ namespace veneer::calibration {
 
 Result<Answer> verify(StepContext& context) {
   WizardResults& results = context.results;
+  results.verification.reset();
   if (!results.measured)
     return fail(Errc::kInvalidOption, "there is no profile to be proved; do the step light");
   // Not the seed of the patches by which "veneer verify" asks later.

@@ -9,6 +9,9 @@ namespace {
 
 /// A session that goes on under another lamp does not fit together.
 constexpr double kLargestJump = 0.01;
+/// Beyond this it is no lamp that drifts: the lens is covered, the instrument looks elsewhere.
+constexpr double kAbsurdJump = 0.2;
+constexpr int kMostTimeouts = 5;
 /// Readings whose mean is remembered as the settled white.
 constexpr std::size_t kSettledReadings = 8;
 
@@ -27,7 +30,7 @@ Result<Answer> warm_up(StepContext& context) {
   WarmUp& readings = context.results.warm_up;
   readings = {};
   const Eigen::Vector2d centre = raster_centre(devices);
-  VENEER_TRY(devices.display->show(grey(full_code(devices))));
+  int timeouts = 0;
   const Time begin = devices.clock->now();
   bool settled = false;
   context.progress.start("warming up", static_cast<std::int64_t>(options.most_warm_up_s));
@@ -35,8 +38,12 @@ Result<Answer> warm_up(StepContext& context) {
   double window = options.warm_up_window_s;
   while (true) {
     const Time next = devices.clock->now() + from_seconds(options.warm_up_interval_s);
+    // Each time anew: what lies over the picture meanwhile (a dialog, a dimmed window) goes.
+    VENEER_TRY(devices.display->show(grey(full_code(devices))));
     auto reading = devices.colorimeter->read(Target::kWhiteReference, centre);
-    if (!reading && reading.error().code != Errc::kTimeout) return tl::unexpected(reading.error());
+    timeouts = reading ? 0 : timeouts + 1;
+    if (!reading && (reading.error().code != Errc::kTimeout || timeouts >= kMostTimeouts))
+      return tl::unexpected(reading.error());
     const double elapsed = to_seconds(devices.clock->now() - begin);
     if (reading && reading->allFinite() && reading->y() > 0) {
       readings.seconds.push_back(elapsed);
@@ -75,17 +82,23 @@ Result<Answer> warm_up(StepContext& context) {
     white += readings.luminance[i] / static_cast<double>(last);
   if (const double before = earlier_white(context.journal); before > 0) {
     const double jump = white / before - 1;
-    if (std::abs(jump) > kLargestJump)
+    if (std::abs(jump) > kAbsurdJump)
+      context.find({Finding::Severity::kFailure,
+                    fmt::format("white is {:+.0f} % from what it was when this session was begun",
+                                100 * jump),
+                    "uncover the lens, point the instrument at the board, and do this step again"});
+    else if (std::abs(jump) > kLargestJump)
       context.find({Finding::Severity::kWarning,
                     fmt::format("white is {:+.1f} % from what it was when this session was begun: "
                                 "readings from before and after the break do not fit together",
                                 100 * jump),
                     "begin again with --restart"});
-  } else {
+  } else if (settled) {
     VENEER_TRY(context.journal.add("warm-up", "settled white", white));
   }
   context.report.summary =
-      fmt::format("settled after {:.1f} minutes: {:+.3f} % a minute, {:+.1f} % since the start",
+      fmt::format("{} {:.1f} minutes: {:+.3f} % a minute, {:+.1f} % since the start",
+                  settled ? "settled after" : "not settled after",
                   minutes,
                   100 * drift,
                   100 * (white / readings.luminance.front() - 1));
