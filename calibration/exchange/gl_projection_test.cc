@@ -9,22 +9,10 @@
 #include "base/files.h"
 #include "base/random.h"
 #include "base/testing/temporary_folder.h"
+#include "calibration/internal_profile_testing.h"
 
 namespace veneer::calibration {
 namespace {
-
-ProjectorGeometry geometry() {
-  ProjectorGeometry g;
-  g.width = 1280;
-  g.height = 800;
-  g.fx = 1900;
-  g.fy = 1850;
-  g.cx = 652.25;
-  g.cy = 910.5;  // a lens that is shifted up, out of the raster
-  g.world_from_projector.rotation = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, -1).normalized());
-  g.world_from_projector.translation = {0.5, -1.0, 2.0};
-  return g;
-}
 
 /// Where GL draws: pixels from the left and from the top, and depth, of a viewport of the raster.
 Eigen::Vector3d window_of(const Eigen::Vector4d& clip, const ProjectorGeometry& g) {
@@ -35,7 +23,7 @@ Eigen::Vector3d window_of(const Eigen::Vector4d& clip, const ProjectorGeometry& 
 constexpr double kPixelTolerance = 1e-9;  // double precision over a raster of a thousand
 
 TEST(GlProjection, APointLandsOnThePinholesPixel) {
-  const ProjectorGeometry g = geometry();
+  const ProjectorGeometry g = example_geometry();
   const auto veneer = gl_projection(g, 0.1, 10, EyeAxes::kVeneer);
   const auto open_gl = gl_projection(g, 0.1, 10, EyeAxes::kOpenGl);
   ASSERT_TRUE(veneer && open_gl);
@@ -56,20 +44,21 @@ TEST(GlProjection, APointLandsOnThePinholesPixel) {
 }
 
 TEST(GlProjection, NearAndFarAreTheEndsOfDepth) {
-  const auto p = gl_projection(geometry(), 0.25, 8, EyeAxes::kVeneer);
+  const auto p = gl_projection(example_geometry(), 0.25, 8, EyeAxes::kVeneer);
   ASSERT_TRUE(p);
-  EXPECT_NEAR(window_of(*p * Eigen::Vector4d(0.1, 0.2, 0.25, 1), geometry()).z(), -1, 1e-12);
-  EXPECT_NEAR(window_of(*p * Eigen::Vector4d(0.1, 0.2, 8, 1), geometry()).z(), 1, 1e-12);
+  EXPECT_NEAR(
+      window_of(*p * Eigen::Vector4d(0.1, 0.2, 0.25, 1), example_geometry()).z(), -1, 1e-12);
+  EXPECT_NEAR(window_of(*p * Eigen::Vector4d(0.1, 0.2, 8, 1), example_geometry()).z(), 1, 1e-12);
 }
 
 TEST(GlProjection, WhatIsBehindIsClipped) {
-  const auto p = gl_projection(geometry(), 0.25, 8, EyeAxes::kVeneer);
+  const auto p = gl_projection(example_geometry(), 0.25, 8, EyeAxes::kVeneer);
   ASSERT_TRUE(p);
   EXPECT_LT((*p * Eigen::Vector4d(0, 0, -1, 1)).w(), 0);
 }
 
 TEST(GlProjection, TheFileTakesAPointOfTheWorldToItsPixel) {
-  const ProjectorGeometry g = geometry();
+  const ProjectorGeometry g = example_geometry();
   const TemporaryFolder folder;
   ASSERT_TRUE(write_gl_projection(folder.path() / "gl.json", g, 0.1, 10));
   const auto text = read_text(folder.path() / "gl.json");
@@ -90,18 +79,18 @@ TEST(GlProjection, TheFileTakesAPointOfTheWorldToItsPixel) {
 
 TEST(GlProjection, WhatMakesNoMatrixIsRefused) {
   const double nan = std::nan("");
-  EXPECT_FALSE(gl_projection(geometry(), 0, 1));
-  EXPECT_FALSE(gl_projection(geometry(), 1, 1));
-  EXPECT_FALSE(gl_projection(geometry(), 0.1, INFINITY));
-  EXPECT_FALSE(gl_projection(geometry(), nan, 1));
-  EXPECT_FALSE(gl_projection(geometry(), 0.1, nan));
-  ProjectorGeometry g = geometry();
+  EXPECT_FALSE(gl_projection(example_geometry(), 0, 1));
+  EXPECT_FALSE(gl_projection(example_geometry(), 1, 1));
+  EXPECT_FALSE(gl_projection(example_geometry(), 0.1, INFINITY));
+  EXPECT_FALSE(gl_projection(example_geometry(), nan, 1));
+  EXPECT_FALSE(gl_projection(example_geometry(), 0.1, nan));
+  ProjectorGeometry g = example_geometry();
   g.fx = 0;
   EXPECT_FALSE(gl_projection(g, 0.1, 1));
-  g = geometry();
+  g = example_geometry();
   g.cy = nan;
   EXPECT_FALSE(gl_projection(g, 0.1, 1));
-  g = geometry();
+  g = example_geometry();
   g.width = 0;
   EXPECT_FALSE(gl_projection(g, 0.1, 1));
 }

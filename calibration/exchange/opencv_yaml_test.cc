@@ -8,26 +8,14 @@
 #include <cmath>
 
 #include "base/testing/temporary_folder.h"
+#include "calibration/internal_profile_testing.h"
 
 // Read back with OpenCV itself, which the module does without.
 namespace veneer::calibration {
 namespace {
 
-ProjectorGeometry geometry() {
-  ProjectorGeometry g;
-  g.width = 1280;
-  g.height = 800;
-  g.fx = 1900;
-  g.fy = 1850.125;
-  g.cx = 652.25;
-  g.cy = 910.5;
-  g.world_from_projector.rotation = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, -1).normalized());
-  g.world_from_projector.translation = {0.5, -1.0, 2.0};
-  return g;
-}
-
 TEST(OpencvYaml, OpencvProjectsAPointOfTheWorldToOurPixel) {
-  const ProjectorGeometry g = geometry();
+  const ProjectorGeometry g = example_geometry();
   const TemporaryFolder folder;
   const std::string path = (folder.path() / "projector.yml").string();
   ASSERT_TRUE(write_opencv_yaml(path, g));
@@ -64,7 +52,7 @@ TEST(OpencvYaml, OpencvProjectsAPointOfTheWorldToOurPixel) {
 
 TEST(OpencvYaml, CoefficientsComeBackBitByBit) {
   const std::vector<double> distortion{0.1, -1e-17, 1.0 / 3, 0, 2};
-  const auto text = opencv_yaml(geometry(), distortion);
+  const auto text = opencv_yaml(example_geometry(), distortion);
   ASSERT_TRUE(text);
   const cv::FileStorage file(*text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
   cv::Mat read;
@@ -75,15 +63,15 @@ TEST(OpencvYaml, CoefficientsComeBackBitByBit) {
 }
 
 TEST(OpencvYaml, WhatOpencvWouldNotTakeIsRefused) {
-  EXPECT_FALSE(opencv_yaml(geometry(), {1}));
-  EXPECT_FALSE(opencv_yaml(geometry(), {0, 0, std::nan(""), 0}));
-  ProjectorGeometry g = geometry();
+  EXPECT_FALSE(opencv_yaml(example_geometry(), {1}));
+  EXPECT_FALSE(opencv_yaml(example_geometry(), {0, 0, std::nan(""), 0}));
+  ProjectorGeometry g = example_geometry();
   g.fy = -1;
   EXPECT_FALSE(opencv_yaml(g));
-  g = geometry();
+  g = example_geometry();
   g.world_from_projector.rotation.coeffs().setZero();
   EXPECT_FALSE(opencv_yaml(g));
-  g = geometry();
+  g = example_geometry();
   g.world_from_projector.translation.x() = INFINITY;
   EXPECT_FALSE(opencv_yaml(g));
 }

@@ -11,11 +11,7 @@
 #include <filesystem>
 #include <fstream>
 
-namespace {
-
 using namespace veneer::calibration;
-
-}  // namespace
 
 extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv);
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
