@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "base/random.h"
+#include "calibration/exchange/cube.h"
 #include "calibration/profile.h"
 #include "tests/program.h"
 
@@ -209,8 +210,8 @@ TEST_F(WizardTest, VerifyTellsAProfileThatHoldsFromOneThatDoesNot) {
 
 TEST_F(WizardTest, ColourModelsCanBeFittedToReadingsAlone) {
   const std::string readings = (at("good") / "readings.ti3").string();
-  const Outcome outcome =
-      run("veneer calibrate colour " + readings + " --json --quiet --icc " + text("alone.icc"));
+  const Outcome outcome = run("veneer calibrate colour " + readings + " --json --quiet --icc " +
+                              text("alone.icc") + " --cube " + text("alone.cube"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   const json found = parsed(outcome);
   EXPECT_TRUE(found["additive"]);
@@ -220,6 +221,16 @@ TEST_F(WizardTest, ColourModelsCanBeFittedToReadingsAlone) {
     if (each["fitted"]) best = std::min(best, each["de00_mean"].get<double>());
   EXPECT_LT(best, 0.5);
   EXPECT_TRUE(fs::exists(at("alone.icc")));
+  const auto table = calibration::read_cube(at("alone.cube"));
+  ASSERT_TRUE(table) << table.error().what;
+  EXPECT_EQ(table->values.front(), Eigen::Vector3d::Zero());
+  // White is as bright as the projector can: some channel is at full drive, none much below the
+  // others' reach; and greys rise.
+  EXPECT_GT(table->values.back().maxCoeff(), 0.999);
+  for (int i = 1; i < 33; ++i) {
+    const auto node = static_cast<std::size_t>(i * (1 + 33 + 33 * 33));
+    EXPECT_GE(table->values[node].sum(), table->values[node - (1 + 33 + 33 * 33)].sum()) << i;
+  }
   ASSERT_TRUE(write_text(at("empty.ti3"), "CTI3\n"));
   EXPECT_TRUE(fails(run("veneer calibrate colour " + text("empty.ti3")), 1, "empty.ti3"));
   EXPECT_TRUE(fails(run("veneer calibrate colour"), 2, "readings"));

@@ -20,7 +20,6 @@ enum class Task {
   kRemoveBoard,
   kTouch,         ///< landmark number `index` of the object, with the tracked stylus
   kTouchSpot,     ///< the cross-hair that the projector shows at `pixel`, with the stylus
-  kLookAtScreen,  ///< the number that a display shows
 };
 
 struct Request {

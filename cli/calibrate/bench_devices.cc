@@ -73,7 +73,6 @@ Result<Answer> BenchDevices::Hands::please(const calibration::Request& request) 
     case Task::kAimAtObject:
     case Task::kCoverLens:
     case Task::kUncoverLens:
-    case Task::kLookAtScreen:
       break;
   }
   return answer;

@@ -8,9 +8,11 @@
 
 #include "base/exit_code.h"
 #include "calibration/colour/baking.h"
+#include "calibration/colour/inverse.h"
 #include "calibration/colour/ramps.h"
 #include "calibration/colour/selection.h"
 #include "calibration/exchange/cgats.h"
+#include "calibration/exchange/cube.h"
 #include "calibration/exchange/icc.h"
 
 namespace veneer::cli {
@@ -53,6 +55,29 @@ ordered_json json_of(const calibration::ColourCandidate& candidate) {
   return json;
 }
 
+/// sRGB to drives, its white the brightest that the projector reaches; what cannot be shown keeps
+/// its hue.
+Result<calibration::CubeTable> srgb_table(const calibration::ColourModel& model, const Xyz& black) {
+  constexpr int kNodes = 33;
+  VENEER_ASSIGN(const calibration::ColourInverse inverse,
+                calibration::ColourInverse::make(model, black));
+  const Xyz white = xyz_from_srgb() * Eigen::Vector3d::Ones();
+  double low = 0;
+  double high = 4 * model.forward(Eigen::Vector3d::Ones()).y();
+  for (int i = 0; i < 40; ++i) {
+    const double middle = 0.5 * (low + high);
+    (inverse(middle * white - black).in_gamut ? low : high) = middle;
+  }
+  calibration::CubeTable table =
+      calibration::CubeTable::sampled(kNodes, [&](const Eigen::Vector3d& rgb) {
+        const Eigen::Vector3d linear = rgb.unaryExpr([](double v) { return srgb_decode(v); });
+        const Xyz relative = xyz_from_srgb() * linear;
+        return inverse(low * relative - relative.y() * black).drive;
+      });
+  table.title = "sRGB to projector drive";
+  return table;
+}
+
 }  // namespace
 
 Result<int> calibrate_colour(CommandLine& line) {
@@ -60,6 +85,7 @@ Result<int> calibrate_colour(CommandLine& line) {
   fs::path readings_path;
   fs::path held_out_path;
   fs::path icc;
+  fs::path cube;
   CLI::App& app = line.app();
   app.add_option("colour", sub_command)->required();
   app.add_option("readings", readings_path, "Readings of patches, a .ti3")->required();
@@ -67,6 +93,8 @@ Result<int> calibrate_colour(CommandLine& line) {
                  held_out_path,
                  "Other readings, by which a model is chosen (default: a third of the mixtures)");
   app.add_option("--icc", icc, "Write an ICC profile of the model that is chosen");
+  app.add_option(
+      "--cube", cube, "Write a look-up table, .cube, that makes the projector show sRGB");
   line.parse();
 
   VENEER_ASSIGN(const calibration::MeasuredPatches measured, calibration::read_ti3(readings_path));
@@ -103,6 +131,11 @@ Result<int> calibrate_colour(CommandLine& line) {
         return Xyz(selected.model->forward(drive) + black);
       };
     VENEER_TRY(calibration::write_icc(icc, source));
+  }
+
+  if (!cube.empty()) {
+    VENEER_ASSIGN(const calibration::CubeTable table, srgb_table(*selected.model, black));
+    VENEER_TRY(calibration::write_cube(cube, table));
   }
 
   ordered_json json{{"model", selected.model->name()},
