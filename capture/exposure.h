@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "capture/cameras/camera.h"
+#include "capture/camera.h"
 
 namespace veneer::capture {
 

@@ -12,13 +12,15 @@ find_package(BZip2 REQUIRED)
 find_package(assimp REQUIRED)
 find_package(embree 3 REQUIRED)
 find_package(CLI11 REQUIRED)
-find_package(OpenCV REQUIRED COMPONENTS core imgproc calib3d)
+find_package(OpenCV REQUIRED COMPONENTS core imgproc calib3d photo videoio aruco)
 find_package(Ceres REQUIRED)
 # Its package hands out the static library, whose copies of Eigen's functions are built for SSE2. Linked
 # beside ours, which are built for AVX, the linker takes one of the two for both, and memory is then
 # not aligned as the other expects: a crash in Eigen. The shared library keeps its copies to itself.
 find_library(CERES_SHARED_LIBRARY NAMES libceres.so REQUIRED)
 set_target_properties(Ceres::ceres PROPERTIES IMPORTED_LOCATION_RELEASE ${CERES_SHARED_LIBRARY})
+pkg_check_modules(ARAVIS REQUIRED IMPORTED_TARGET aravis-0.8)
+pkg_check_modules(GPHOTO2 REQUIRED IMPORTED_TARGET libgphoto2)
 pkg_check_modules(SDL2 REQUIRED IMPORTED_TARGET sdl2)
 pkg_check_modules(OPENEXR REQUIRED IMPORTED_TARGET OpenEXR)
 pkg_check_modules(LIBZIP REQUIRED IMPORTED_TARGET libzip)

@@ -40,7 +40,7 @@ JUDGED_BY_BENCH = ("render/", "calibration/")
 
 # Headers that would make every user of a module depend on a driver's, and the headers of ours that
 # exist to wrap them.
-DRIVER_HEADER = re.compile(r"<(GL|GLES\w*|EGL|epoxy|libusb|gbm|libdrm|xf86drm|hidapi)\b")
+DRIVER_HEADER = re.compile(r"<(GL|GLES\w*|EGL|epoxy|libusb|gbm|libdrm|xf86drm|hidapi|arv|gphoto2)\b")
 MAY_SHOW_DRIVER_HEADERS = ("*/internal_*.h", "render/gl_objects.h", "render/egl_context.h")
 
 MODULE = re.compile(r"^\s*veneer_add_module\(\s*(\w+)\s+LAYER\s+(\d+)", re.MULTILINE)

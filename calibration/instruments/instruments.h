@@ -13,7 +13,7 @@
 #include "base/toml_reader.h"
 #include "calibration/instruments/colorimeter.h"
 #include "calibration/instruments/shown_patch.h"
-#include "capture/cameras/camera.h"
+#include "capture/camera.h"
 
 namespace veneer::calibration {
 

@@ -11,7 +11,7 @@
 #include "calibration/instruments/colorimeter.h"
 #include "calibration/patch_display.h"
 #include "calibration/wizard/operator.h"
-#include "capture/cameras/camera.h"
+#include "capture/camera.h"
 #include "tracking/synchronised.h"
 
 namespace veneer::calibration {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/image.h"
-#include "capture/cameras/camera.h"
+#include "capture/camera.h"
 #include "simulation/bench.h"
 #include "simulation/bench/board_view.h"
 #include "simulation/bench/colorimeter.h"
@@ -34,6 +34,9 @@ class VirtualCamera final : public capture::Camera {
   [[nodiscard]] int width() const override { return truth_.width; }
   [[nodiscard]] int height() const override { return truth_.height; }
   [[nodiscard]] Status set_exposure(double seconds) override;
+  [[nodiscard]] capture::ExposureRange exposure_range() const override {
+    return {truth_.least_exposure_s, truth_.most_exposure_s};
+  }
   [[nodiscard]] Result<capture::CameraFrame> grab() override;
 
   /// world_from_board of every place for the board.

@@ -10,7 +10,7 @@
 #include "base/colour.h"
 #include "base/result.h"
 #include "calibration/instruments/colorimeter.h"
-#include "capture/cameras/camera.h"
+#include "capture/camera.h"
 
 namespace veneer::calibration {
 

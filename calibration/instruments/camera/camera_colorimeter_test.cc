@@ -25,6 +25,7 @@ class SpotCamera final : public capture::Camera {
     exposure_s = seconds;
     return {};
   }
+  [[nodiscard]] capture::ExposureRange exposure_range() const override { return {1e-6, 1e3}; }
   Result<capture::CameraFrame> grab() override {
     if (is_gone) return fail(Errc::kDisconnected, "gone");
     capture::CameraFrame frame;

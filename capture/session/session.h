@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "base/clock.h"
+#include "base/progress.h"
+#include "base/result.h"
+#include "capture/camera.h"
+#include "capture/hands.h"
+#include "capture/plan.h"
+#include "capture/polariser.h"
+
+namespace veneer::capture {
+
+/// What a session works with; all borrowed.
+struct CaptureDevices {
+  Camera* camera = nullptr;
+  Polariser* polariser = nullptr;  ///< null where the sensor has its analysers on it
+  Hands* hands = nullptr;
+  Clock* clock = nullptr;
+};
+
+struct SessionOutcome {
+  int taken = 0;     ///< pictures, this time
+  int recalled = 0;  ///< that an earlier run had taken
+  std::vector<std::string>
+      warnings;  ///< saturation, movement, too little light; each with its place
+};
+
+/// Takes what the plan asks for and is not there yet: for each target (white, mirror, ball,
+/// sample), view and light a bracket of exposures chosen from the histogram, once behind each angle
+/// of the analyser, and the same without the projector's light. While it goes on it checks for
+/// saturation and for movement (the last picture of a direction repeats the first), and says how
+/// long the rest will take. Errors: those of Recording::resume(), of the devices (the session goes
+/// on from there when it is run again), kIo.
+[[nodiscard]] Result<SessionOutcome> run_session(const CapturePlan& plan,
+                                                 const std::filesystem::path& folder,
+                                                 const CaptureDevices& devices,
+                                                 Progress& progress);
+
+}  // namespace veneer::capture
