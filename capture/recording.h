@@ -24,6 +24,8 @@ struct Shot {
   int analyser = 0;
   int exposure = 0;   ///< index into the bracket, shortest first
   bool dark = false;  ///< without the projector's light: room light, dark current, fixed pattern
+  /// The first picture of a direction once more at its end: tells movement, drift and noise.
+  bool repeat = false;
 
   friend bool operator==(const Shot&, const Shot&) = default;
   friend auto operator<=>(const Shot&, const Shot&) = default;

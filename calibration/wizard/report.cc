@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "base/colour.h"
+#include "base/report_page.h"
 
 namespace veneer::calibration {
 namespace {
@@ -257,14 +258,7 @@ ordered_json report_of(const WizardResults& results,
 }
 
 std::string report_page(const ordered_json& report) {
-  std::string page = kPage;
-  const std::string place = "{{DATA}}";
-  // "</" could end the script that the data stand in.
-  std::string text = report.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
-  for (std::size_t at = 0; (at = text.find("</", at)) != std::string::npos; at += 3)
-    text.replace(at, 2, "<\\/");
-  page.replace(page.find(place), place.size(), text);
-  return page;
+  return page_with_data(kPage, report);
 }
 
 }  // namespace veneer::calibration

@@ -27,7 +27,8 @@ constexpr int kLookAtEvery = 5;
 constexpr std::string_view kUncompensated = "frames-uncompensated";
 
 struct DemoOptions {
-  fs::path etc;  ///< the project's folder etc
+  fs::path etc;   ///< the project's folder etc
+  fs::path show;  ///< veneer.toml and scene.toml of what is shown, and its bench.toml if it has one
   fs::path out = "out/demo";
   fs::path set;  ///< the embedded material where empty
   std::string model;
@@ -143,18 +144,27 @@ Result<int> run_demo(CommandLine& line) {
       ->capture_default_str()
       ->check(CLI::Range(1, 100000));
   app.add_option("--etc", options.etc, "The project's folder etc");
+  app.add_option(
+      "--show",
+      options.show,
+      "A folder with veneer.toml, scene.toml and, where it is not the demo's, bench.toml "
+      "(default: etc/demo)");
   line.parse();
   const bool scalars = options.model == "texel-colours" || options.model == "dichromatic-lpca";
   if (components->count() == 0) options.fit.components = scalars ? "8+4" : "8";
 
   const fs::path& out = options.out;
-  const fs::path bench = options.etc / "benches" / "demo.toml";
+  if (options.show.empty()) options.show = options.etc / "demo";
+  std::error_code ignored;
+  const fs::path bench = fs::exists(options.show / "bench.toml", ignored)
+                             ? options.show / "bench.toml"
+                             : options.etc / "benches" / "demo.toml";
   VENEER_TRY(clear_results(out));
   VENEER_ASSIGN(const fs::path set, sample_set(options, line.progress()));
   VENEER_TRY(fit_material(options, set, out / "material.safetensors", line.progress()));
   VENEER_TRY(calibrate(bench, out / "profile", line.progress()));
   for (const char* name : {"veneer.toml", "scene.toml"}) {
-    VENEER_ASSIGN(const std::string text, read_text(options.etc / "demo" / name));
+    VENEER_ASSIGN(const std::string text, read_text(options.show / name));
     VENEER_TRY(write_text(out / name, text));
   }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/files.h"
+#include "base/report_page.h"
 #include "cli/harness/harness_run.h"
 
 namespace veneer::cli {
@@ -69,15 +70,7 @@ Status write_harness_report(const Scenario& scenario,
     data["events"].push_back(
         {{"s", event.seconds}, {"state", event.state}, {"detail", event.detail}});
   }
-  std::string page = kPage;
-  const std::string place = "{{DATA}}";
-  // "</" could end the script that the data stand in.
-  std::string text = data.dump();
-  for (std::size_t at = 0; (at = text.find("</", at)) != std::string::npos; at += 3) {
-    text.replace(at, 2, "<\\/");
-  }
-  page.replace(page.find(place), place.size(), text);
-  return write_text(folder / "index.html", page);
+  return write_text(folder / "index.html", page_with_data(kPage, data));
 }
 
 }  // namespace veneer::cli

@@ -8,6 +8,7 @@
 
 #include "base/files.h"
 #include "base/image_files.h"
+#include "base/report_page.h"
 #include "cli/report/pictures.h"
 
 namespace veneer::cli {
@@ -120,14 +121,7 @@ Status write_report(const ordered_json& report,
                           {"samples", samples_json(verification)},
                           {"frame_ms", frame_ms},
                           {"difference_scale", kDifferenceScale}};
-  std::string text = data.dump();
-  // "</script>" in a name must not end the element that holds the data.
-  for (std::size_t at = 0; (at = text.find("</", at)) != std::string::npos; at += 3)
-    text.replace(at, 2, "<\\/");
-  std::string page = kPage;
-  constexpr std::string_view kPlace = "{{DATA}}";
-  page.replace(page.find(kPlace), kPlace.size(), text);
-  VENEER_TRY(write_text(run_folder / "index.html", page));
+  VENEER_TRY(write_text(run_folder / "index.html", page_with_data(kPage, data)));
   return write_text(run_folder / "report.json", report.dump(2) + "\n");
 }
 

@@ -35,6 +35,23 @@ Status require_angle(TomlReader& toml, std::string_view key, double& angle_rad) 
   return {};
 }
 
+/// There and back between two angles, at rest at both ends.
+struct Swing {
+  double from_rad = 0;
+  double to_rad = 0;
+  double period_s = 0;
+
+  Status read(TomlReader& toml) {
+    VENEER_TRY(require_angle(toml, "from_deg", from_rad));
+    VENEER_TRY(require_angle(toml, "to_deg", to_rad));
+    return require_in(toml, "period_s", 1e-2, 1e6, period_s);
+  }
+  [[nodiscard]] double angle_rad(double seconds) const {
+    const double there = 0.5 - 0.5 * std::cos(2 * std::numbers::pi * seconds / period_s);
+    return from_rad + there * (to_rad - from_rad);
+  }
+};
+
 /// A circle around a point; an observer on it faces the point.
 struct Circle {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
@@ -118,13 +135,13 @@ Result<Path> Path::read(TomlReader& toml) {
   if (kind == "walk") read_motion = &read_walk;
   if (kind == "orbit") read_motion = &read_orbit;
   if (kind == "fixed") read_motion = &read_fixed;
+  if (kind == "turn") read_motion = &read_turn;
   if (kind == "waypoints") read_motion = &read_waypoints;
   if (read_motion == nullptr) {
-    return fail(
-        Errc::kInvalidOption,
-        "reading a tracker path: kind is \"{}\"; set it to \"walk\", \"orbit\", \"fixed\" or "
-        "\"waypoints\"",
-        kind);
+    return fail(Errc::kInvalidOption,
+                "reading a tracker path: kind is \"{}\"; set it to \"walk\", \"orbit\", \"fixed\", "
+                "\"turn\" or \"waypoints\"",
+                kind);
   }
   VENEER_ASSIGN(Motion motion, read_motion(toml));
   return Path(body, std::move(motion));
@@ -132,17 +149,10 @@ Result<Path> Path::read(TomlReader& toml) {
 
 Result<Path::Motion> Path::read_walk(TomlReader& toml) {
   Circle circle;
-  double from_rad = 0;
-  double to_rad = 0;
-  double period_s = 0;
+  Swing swing;
   VENEER_TRY(circle.read(toml));
-  VENEER_TRY(require_angle(toml, "from_deg", from_rad));
-  VENEER_TRY(require_angle(toml, "to_deg", to_rad));
-  VENEER_TRY(require_in(toml, "period_s", 1e-2, 1e6, period_s));
-  return [=](double seconds) {
-    const double there = 0.5 - 0.5 * std::cos(2 * std::numbers::pi * seconds / period_s);
-    return circle.observer(from_rad + there * (to_rad - from_rad));
-  };
+  VENEER_TRY(swing.read(toml));
+  return [=](double seconds) { return circle.observer(swing.angle_rad(seconds)); };
 }
 
 Result<Path::Motion> Path::read_orbit(TomlReader& toml) {
@@ -167,6 +177,23 @@ Result<Path::Motion> Path::read_fixed(TomlReader& toml) {
   const double angle_rad = to_radians(Degrees{rotation_deg.norm()}).value;
   if (angle_rad > 0) fixed.rotation = Eigen::AngleAxisd(angle_rad, rotation_deg.normalized());
   return [=](double /*seconds*/) { return fixed; };
+}
+
+Result<Path::Motion> Path::read_turn(TomlReader& toml) {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitY();
+  Swing swing;
+  toml.read("position", position);
+  toml.read("axis", axis);
+  VENEER_TRY(swing.read(toml));
+  if (!(axis.norm() > 1e-9 && axis.allFinite()))
+    return fail(Errc::kInvalidOption,
+                "reading a tracker path: give axis a vector that is not zero, such as [0, 1, 0]");
+  axis.normalize();
+  return [=](double seconds) {
+    return RigidTransform{Eigen::Quaterniond(Eigen::AngleAxisd(swing.angle_rad(seconds), axis)),
+                          position};
+  };
 }
 
 Result<Path::Motion> Path::read_waypoints(TomlReader& toml) {

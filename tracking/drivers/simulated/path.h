@@ -27,6 +27,8 @@ class Path {
   ///   orbit      centre, radius_m, height_m, from_deg, rate_deg_s: on a circle at a constant rate,
   ///              facing the point
   ///   fixed      position, rotation_deg (a rotation vector: the axis times the angle)
+  ///   turn       position, axis, from_deg, to_deg, period_s: on the spot about an axis, there and
+  ///              back in a period, at rest at both ends
   ///   waypoints  look_at and [[tracker.path.waypoint]] tables with time_s, position: a smooth
   ///   curve
   ///              (continuous velocity) through them, at rest before the first and after the last
@@ -50,6 +52,7 @@ class Path {
   static Result<Motion> read_walk(TomlReader& toml);
   static Result<Motion> read_orbit(TomlReader& toml);
   static Result<Motion> read_fixed(TomlReader& toml);
+  static Result<Motion> read_turn(TomlReader& toml);
   static Result<Motion> read_waypoints(TomlReader& toml);
 
   BodyId body_;

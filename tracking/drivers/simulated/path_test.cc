@@ -93,6 +93,23 @@ TEST(Path, FixedStaysWhereItWasPut) {
   }
 }
 
+TEST(Path, TurnKeepsItsPlaceAndItsAxis) {
+  const auto path = path_of(
+      "kind = \"turn\"\nposition = [1, 2, 3]\naxis = [0, 2, 0]\nfrom_deg = -60\nto_deg = 60\n"
+      "period_s = 4\n");
+  ASSERT_TRUE(path) << path.error().what;
+  for (double seconds = -3; seconds < 9; seconds += 0.37) {
+    EXPECT_EQ(path->at(seconds).translation, Vector3d(1, 2, 3));
+    EXPECT_LT((path->at(seconds).rotation * Vector3d::UnitY() - Vector3d::UnitY()).norm(),
+              kRoundingTolerance);
+  }
+  // A positive angle turns +z towards +x.
+  EXPECT_NEAR((path->at(0).rotation * Vector3d::UnitZ()).x(), -std::sqrt(0.75), kRoundingTolerance);
+  EXPECT_NEAR((path->at(2).rotation * Vector3d::UnitZ()).x(), std::sqrt(0.75), kRoundingTolerance);
+  EXPECT_FALSE(
+      path_of("kind = \"turn\"\naxis = [0, 0, 0]\nfrom_deg = 0\nto_deg = 1\nperiod_s = 1\n"));
+}
+
 TEST(Path, WaypointsAreMetInTimeOnACurveWithoutKinks) {
   const auto path = path_of(R"(
 kind = "waypoints"
