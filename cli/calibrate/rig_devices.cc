@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "base/toml_reader.h"
+#include "capture/cameras/cameras.h"
 #include "cli/calibrate/display_picker.h"
 #include "projector/outputs.h"
 #include "projector/outputs/window/window_output.h"
@@ -43,6 +44,7 @@ Result<std::unique_ptr<RigDevices>> RigDevices::open(const std::filesystem::path
     options.landmarks.push_back(std::move(landmark));
   }
   VENEER_TRY(rig->open_output(toml));
+  VENEER_TRY(rig->open_camera(toml));
   VENEER_TRY(rig->open_instrument(toml));
   VENEER_TRY(rig->open_probes(toml, options));
   VENEER_TRY(toml.finish());
@@ -84,6 +86,13 @@ Status RigDevices::open_output(TomlReader& toml) {
   return {};
 }
 
+Status RigDevices::open_camera(TomlReader& toml) {
+  TomlReader table = toml.table("camera");
+  if (!table.contains("driver")) return {};
+  VENEER_ASSIGN(camera_, capture::open_camera(table));
+  return {};
+}
+
 Status RigDevices::open_instrument(TomlReader& toml) {
   const auto ask = [this](const std::string& what_to_do) -> Status {
     VENEER_ASSIGN(const Answer answer,
@@ -94,7 +103,7 @@ Status RigDevices::open_instrument(TomlReader& toml) {
   };
   TomlReader table = toml.table("instrument");
   VENEER_ASSIGN(instrument_,
-                calibration::open_instrument(table, {clock_, ask, &*watched_, nullptr}));
+                calibration::open_instrument(table, {clock_, ask, &*watched_, camera_.get()}));
   aimed_.emplace(*instrument_, hands_);
   return {};
 }
@@ -131,6 +140,7 @@ calibration::Devices RigDevices::devices() {
   devices.colorimeter = &*aimed_;
   devices.hands = &hands_;
   devices.clock = &clock_;
+  devices.camera = camera_.get();
   devices.begin_step = [this] { aimed_->forget_aim(); };
   devices.board_sensor = board_sensor_ ? &*board_sensor_ : nullptr;
   devices.stylus = stylus_ ? &*stylus_ : nullptr;

@@ -13,6 +13,7 @@
 #include "calibration/wizard/output_display.h"
 #include "calibration/wizard/tracked_probes.h"
 #include "calibration/wizard/wizard.h"
+#include "capture/camera.h"
 #include "projector/output.h"
 #include "tracking/tracker.h"
 
@@ -27,6 +28,8 @@ namespace veneer::cli {
 ///     driver = "window"
 ///     [instrument]
 ///     driver = "spotread"
+///     [camera]                              # optional: finds the geometry; docs/howto/camera.md
+///     driver = "aravis"
 ///     [tracker]                             # optional, as for veneerd
 ///     [board]                               # the chequered board for the camera
 ///     columns = 9
@@ -55,6 +58,7 @@ class RigDevices {
  private:
   explicit RigDevices(calibration::Operator& hands) : hands_(hands) {}
   [[nodiscard]] Status open_output(TomlReader& toml);
+  [[nodiscard]] Status open_camera(TomlReader& toml);
   [[nodiscard]] Status open_instrument(TomlReader& toml);
   [[nodiscard]] Status open_probes(TomlReader& toml, calibration::WizardOptions& options);
 
@@ -67,6 +71,7 @@ class RigDevices {
   std::unique_ptr<projector::Output> output_;
   std::optional<calibration::OutputPatchDisplay> display_;
   std::optional<calibration::WatchedDisplay> watched_;
+  std::unique_ptr<capture::Camera> camera_;  // null: geometry comes from elsewhere
   std::unique_ptr<calibration::Colorimeter> instrument_;
   std::optional<calibration::AimedColorimeter> aimed_;
   std::unique_ptr<tracking::Tracker> tracker_;
