@@ -20,7 +20,8 @@ class ResponseCurve {
   ResponseCurve();
   /// counts = light^(1 / gamma). Errors: kInvalidOption (gamma not in [0.1, 10]).
   [[nodiscard]] static Result<ResponseCurve> gamma(double gamma);
-  /// @param light  at equally spaced counts. Errors: kInvalidOption (fewer than 2, not increasing).
+  /// @param light  at equally spaced counts, in any unit: it is shifted and scaled to 0 at 0 and 1
+  /// at 1. Errors: kInvalidOption (fewer than 2, not increasing, not finite).
   [[nodiscard]] static Result<ResponseCurve> tabulated(
       const std::array<std::vector<double>, 3>& light);
 
@@ -28,6 +29,8 @@ class ResponseCurve {
   [[nodiscard]] double light(int channel, double counts_fraction) const;
   /// d light / d (counts fraction), for noise.
   [[nodiscard]] double slope(int channel, double counts_fraction) const;
+  /// The inverse of light(): the counts that this light makes; cut to [0, 1].
+  [[nodiscard]] double counts_fraction(int channel, double light) const;
   [[nodiscard]] bool linear() const;
 
  private:
