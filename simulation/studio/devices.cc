@@ -144,7 +144,8 @@ Status StudioHands::please(const capture::HandRequest& request) {
       arrangement.dark = request.task == Task::kDarken;
       seconds = kSwitch_s;
       break;
-    case Task::kTurnAnalyser: return turn_analyser(rig_, request.angle_rad, kMove_s);
+    case Task::kTurnAnalyser:
+      return turn_analyser(rig_, request.angle_rad, kMove_s);
   }
   rig_.pass(seconds);
   rig_.arrange(arrangement);

@@ -79,8 +79,8 @@ class StudioCamera final : public capture::Camera {
 /// Does at once, on the rig's clock, what it is asked for.
 class StudioHands final : public capture::Hands {
  public:
-  static constexpr double kMove_s = 20;    ///< a person moves something
-  static constexpr double kSwitch_s = 1;   ///< the projector's picture changes
+  static constexpr double kMove_s = 20;   ///< a person moves something
+  static constexpr double kSwitch_s = 1;  ///< the projector's picture changes
   /// @param rig  borrowed; must outlive the hands.
   explicit StudioHands(StudioRig& rig) : rig_(rig) {}
   [[nodiscard]] Status please(const capture::HandRequest& request) override;

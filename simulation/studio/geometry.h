@@ -43,7 +43,8 @@ class StudioGeometry {
   /// From the board's frame, z into the board.
   [[nodiscard]] RigidTransform local_from_board() const;
   /// Through a place of the picture; pixels, first centre (0.5, 0.5).
-  [[nodiscard]] Ray ray(const RigidTransform& local_from_camera, const Eigen::Vector2d& pixel) const;
+  [[nodiscard]] Ray ray(const RigidTransform& local_from_camera,
+                        const Eigen::Vector2d& pixel) const;
   /// Where the camera sees a point before it.
   [[nodiscard]] Eigen::Vector2d pixel(const RigidTransform& local_from_camera,
                                       const Eigen::Vector3d& x_in_local) const;

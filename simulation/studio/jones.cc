@@ -62,8 +62,7 @@ Beam reflected_by_mirror(const Beam& beam,
                          const Eigen::Vector3d& view) {
   const Eigen::Vector3d normal = (light + view).normalized();
   Beam out;
-  for (std::size_t i = 0; i < out.size(); ++i)
-    out[i] = 2 * beam[i].dot(normal) * normal - beam[i];
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = 2 * beam[i].dot(normal) * normal - beam[i];
   return out;
 }
 

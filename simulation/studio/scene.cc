@@ -78,10 +78,10 @@ void StudioScene::look(int view) {
           const auto texel = on_sample ? geometry_.texel(*on_sample) : std::nullopt;
           if (texel) {
             seen_.area[pixel] += kShare;
-            const auto known = std::find_if(
-                parts.begin() + static_cast<std::ptrdiff_t>(first),
-                parts.end(),
-                [&](const Seen::Part& part) { return part.texel == *texel; });
+            const auto known =
+                std::find_if(parts.begin() + static_cast<std::ptrdiff_t>(first),
+                             parts.end(),
+                             [&](const Seen::Part& part) { return part.texel == *texel; });
             if (known == parts.end())
               parts.push_back({*texel, kShare});
             else
@@ -90,8 +90,7 @@ void StudioScene::look(int view) {
             seen_.board[pixel] += kShare * board_.reflectance(geometry_.board_place(*on_board));
           }
         }
-        const auto middle =
-            meet_plane(geometry_.ray(pose, corner + Eigen::Vector2d(0.5, 0.5)), 0);
+        const auto middle = meet_plane(geometry_.ray(pose, corner + Eigen::Vector2d(0.5, 0.5)), 0);
         seen_.fall_off[pixel] = middle ? static_cast<float>(geometry_.fall_off(*middle)) : 0;
       }
       seen_.first[y * (width + 1) + width] = static_cast<std::uint32_t>(parts.size());
@@ -152,8 +151,7 @@ void StudioScene::lay_ball(Layers& layers) const {
     if (!along) return on_board(ray);
     const Eigen::Vector3d place = ray.origin + *along * ray.direction;
     const Eigen::Vector3d normal = (place - centre) / radius;
-    const Eigen::Vector3d mirrored =
-        ray.direction - 2 * ray.direction.dot(normal) * normal;
+    const Eigen::Vector3d mirrored = ray.direction - 2 * ray.direction.dot(normal) * normal;
     const Light board = on_board({place, mirrored});
     Light sum{0,
               static_cast<float>(kBallReflectance) * board.lost +
@@ -192,7 +190,9 @@ void StudioScene::lay(const Arrangement& arrangement) {
     *image = Image<Rgb32f>(geometry_.width(), geometry_.height());
   const double cos_light = lights_[static_cast<std::size_t>(arrangement.light)].z();
   switch (arrangement.target) {
-    case capture::Target::kSample: lay_sample(layers_); break;
+    case capture::Target::kSample:
+      lay_sample(layers_);
+      break;
     case capture::Target::kWhite:
       lay_plate(layers_, 0, plan_.white_reflectance * cos_light, plan_.white_reflectance);
       break;
@@ -202,7 +202,9 @@ void StudioScene::lay(const Arrangement& arrangement) {
                 kScatter * cos_light,
                 kScatter);
       break;
-    case capture::Target::kMirrorBall: lay_ball(layers_); return;
+    case capture::Target::kMirrorBall:
+      lay_ball(layers_);
+      return;
   }
   for (std::size_t pixel = 0; pixel < seen_.board.size(); ++pixel) {
     const Rgb32f board = Rgb32f::Constant(seen_.board[pixel]);
@@ -247,8 +249,8 @@ Image<Rgb32f> StudioScene::light(const Arrangement& arrangement) {
   std::array<std::array<Passed, 2>, 2> cell;
   for (std::size_t row = 0; row < 2; ++row)
     for (std::size_t column = 0; column < 2; ++column)
-      cell[row][column] = passed_at(truth_.mosaic ? kMosaic_deg[row][column] * kDegree
-                                                  : arrangement.analyser_rad);
+      cell[row][column] =
+          passed_at(truth_.mosaic ? kMosaic_deg[row][column] * kDegree : arrangement.analyser_rad);
 
   const auto width = static_cast<std::size_t>(geometry_.width());
   Image<Rgb32f> light(geometry_.width(), geometry_.height());
@@ -259,9 +261,8 @@ Image<Rgb32f> StudioScene::light(const Arrangement& arrangement) {
       const Passed& passed = cell[pixel / width % 2][pixel % width % 2];
       const Rgb32f lit = passed.mirrored * layers_.mirrored.pixels()[pixel] +
                          passed.lost * layers_.lost.pixels()[pixel];
-      const Rgb32f sum =
-          vignetting_[pixel] *
-          (seen_.fall_off[pixel] * lit + passed.room * layers_.room.pixels()[pixel]);
+      const Rgb32f sum = vignetting_[pixel] *
+                         (seen_.fall_off[pixel] * lit + passed.room * layers_.room.pixels()[pixel]);
       light.pixels()[pixel] = truth_.mosaic ? Rgb32f::Constant(kLuminance.dot(sum)) : sum;
     }
   });

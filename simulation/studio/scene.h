@@ -25,7 +25,7 @@ struct Arrangement {
   capture::Target target = capture::Target::kSample;
   int view = 0;
   int light = 0;
-  bool dark = false;      ///< the projector sends nothing
+  bool dark = false;  ///< the projector sends nothing
   double analyser_rad = 0;
 
   friend bool operator==(const Arrangement&, const Arrangement&) = default;
@@ -73,11 +73,11 @@ class StudioScene {
       std::uint32_t texel;
       float weight;  // of the pixel's rays
     };
-    std::vector<std::vector<Part>> rows;      // the parts of a row's pixels, one after the other
-    std::vector<std::uint32_t> first;         // of a pixel's parts in its row; [height][width + 1]
-    std::vector<float> area;                  // of the pixel that is sample area
-    std::vector<float> board;                 // mean reflectance of the rest, times its share
-    std::vector<float> fall_off;              // of the projector's light
+    std::vector<std::vector<Part>> rows;  // the parts of a row's pixels, one after the other
+    std::vector<std::uint32_t> first;     // of a pixel's parts in its row; [height][width + 1]
+    std::vector<float> area;              // of the pixel that is sample area
+    std::vector<float> board;             // mean reflectance of the rest, times its share
+    std::vector<float> fall_off;          // of the projector's light
   };
   /// The light of one target, view and light before the analyser, for a projector of unit
   /// irradiance.

@@ -84,10 +84,10 @@ StudioSensor::StudioSensor(const StudioTruth& truth)
   offsets_.reserve(channels);
   for (std::size_t i = 0; i < channels; ++i) {
     gains_.push_back(1 + static_cast<float>(truth.fixed_pattern) * deviate(gain_random));
-    offsets_.push_back(std::max(
-        0.0F,
-        static_cast<float>(truth.offset_counts) *
-            (1 + static_cast<float>(kOffsetPattern) * deviate(offset_random))));
+    offsets_.push_back(
+        std::max(0.0F,
+                 static_cast<float>(truth.offset_counts) *
+                     (1 + static_cast<float>(kOffsetPattern) * deviate(offset_random))));
   }
 }
 
@@ -134,8 +134,8 @@ Image<Rgb16> StudioSensor::expose(const Image<Rgb32f>& light,
             got = full_well + read_noise * deviate;
           }
           // The converter takes what is in the well and its offset; a response curve comes last.
-          float counts = std::clamp(
-              got * counts_per_electron + offsets_[3 * pixel + channel], 0.0F, scale);
+          float counts =
+              std::clamp(got * counts_per_electron + offsets_[3 * pixel + channel], 0.0F, scale);
           if (exponent != 1) counts = scale * std::pow(counts / scale, exponent);
           picture.pixels()[pixel][channel] = static_cast<std::uint16_t>(counts + 0.5F);
         }

@@ -78,9 +78,8 @@ Result<std::unique_ptr<VirtualStudio>> VirtualStudio::create(const StudioTruth& 
   const double tile_mm = truth.tile_mm > 0 ? truth.tile_mm : plan.area.width_mm;
   const double texels = tile_mm / plan.area.width_mm * plan.area.columns;
   const int size = static_cast<int>(std::lround(std::min(texels, 1e6)));
-  VENEER_ASSIGN(
-      studio::TracedSample sample,
-      studio::TracedSample::trace(truth, size, plan.views, lights, cache, progress));
+  VENEER_ASSIGN(studio::TracedSample sample,
+                studio::TracedSample::trace(truth, size, plan.views, lights, cache, progress));
   studio::StudioScene scene(
       truth, plan, std::move(geometry), std::move(board), std::move(sample), lights);
   return std::unique_ptr<VirtualStudio>(

@@ -49,8 +49,7 @@ bool same(const btf::DirectionSet& a, const btf::DirectionSet& b) {
 bool fits(const btf::SampleSet& set, const SynthesisOptions& options) {
   const btf::SampleSetInfo& info = set.info();
   return info.polarised && info.width == options.size && info.height == options.size &&
-         same(info.views, options.views) && same(info.lights, options.lights) &&
-         set.check_finite();
+         same(info.views, options.views) && same(info.lights, options.lights) && set.check_finite();
 }
 
 /// Removes a folder when it goes.

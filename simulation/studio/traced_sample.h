@@ -42,7 +42,7 @@ class TracedSample {
   [[nodiscard]] std::size_t place(int view, int light, int column, int row) const;
   int size_ = 0;
   int lights_ = 0;
-  float sum_of_cosines_ = 0;  // of the lights
+  float sum_of_cosines_ = 0;   // of the lights
   std::vector<Texel> texels_;  // [view][light][row][column]
 };
 

@@ -34,20 +34,20 @@ struct StudioTruth {
   int width = 640, height = 480;
   double focal_px = 2200;
   Eigen::Vector2d principal_point{320, 240};
-  double k1 = 0, k2 = 0;             ///< as of capture::CameraLens
-  double distance_mm = 800;          ///< of the camera from the sample's middle
-  double full_well = 20000;          ///< electrons
-  double read_noise = 4;             ///< electrons, standard deviation
-  double dark_current = 2;           ///< electrons a second
-  double fixed_pattern = 0.005;      ///< of the pixels' gains, standard deviation
-  double offset_counts = 16;         ///< added to every pixel, with a pattern of its own
-  double vignetting = 0.3;           ///< loss of light in the picture's corners
-  double response_gamma = 1;         ///< counts go by light^(1 / gamma)
-  int bits = 12;                     ///< 8 to 16
-  bool mosaic = false;               ///< analysers on the sensor, in place of one that turns
-  double dropped = 0;                ///< part of grabs that time out
-  double repeated = 0;               ///< part of grabs that give the picture before once more
-  std::uint64_t seed = 1;            ///< of noise, patterns and aims
+  double k1 = 0, k2 = 0;         ///< as of capture::CameraLens
+  double distance_mm = 800;      ///< of the camera from the sample's middle
+  double full_well = 20000;      ///< electrons
+  double read_noise = 4;         ///< electrons, standard deviation
+  double dark_current = 2;       ///< electrons a second
+  double fixed_pattern = 0.005;  ///< of the pixels' gains, standard deviation
+  double offset_counts = 16;     ///< added to every pixel, with a pattern of its own
+  double vignetting = 0.3;       ///< loss of light in the picture's corners
+  double response_gamma = 1;     ///< counts go by light^(1 / gamma)
+  int bits = 12;                 ///< 8 to 16
+  bool mosaic = false;           ///< analysers on the sensor, in place of one that turns
+  double dropped = 0;            ///< part of grabs that time out
+  double repeated = 0;           ///< part of grabs that give the picture before once more
+  std::uint64_t seed = 1;        ///< of noise, patterns and aims
 
   /// Errors: kNotFound, kIo, kInvalidOption (unknown key, value out of range).
   [[nodiscard]] static Result<StudioTruth> load(const std::filesystem::path& path);
