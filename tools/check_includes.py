@@ -7,8 +7,8 @@
   CMakeLists.txt says veneer_add_module(NAME LAYER n ...); tests/ and benchmarks/ stand above all.
 - A quoted include is a path from the root of the repository, and the file is there. (An embedded
   shader "x.frag.inc" counts as there if x.frag is.)
-- The physics of the virtual bench reaches no header of the modules that it is to judge, not even
-  through others; only its adaptors may.
+- The physics of the virtual bench and studio reaches no header of the modules that it is to judge,
+  not even through others; only the bench's adaptors and the tests may.
 - GL, EGL, USB and display headers stay out of a module's public headers.
 - The first line is the SPDX licence line, a header has #pragma once, and a .cc file with a header
   of its own includes that one first, which proves that the header stands alone.
@@ -26,17 +26,28 @@ SPDX = "// SPDX-License-Identifier: Apache-2.0"
 # Folders of C++ code that are no modules: they may use every floor.
 ABOVE_ALL_FLOORS = ("tests", "benchmarks")
 
-# What the virtual bench must not know of, and which of its files are the adaptors that do: they
-# give the bench the faces of the HAL.
-BENCH_PHYSICS = ("simulation/bench.h", "simulation/bench/*")
-BENCH_ADAPTORS = (
-    "simulation/bench/camera*",
-    "simulation/bench/colorimeter*",
-    "simulation/bench/registration*",
-    "simulation/bench/rig*",
-    "simulation/bench/*_test.cc",
+# What judges without knowing what it judges: its name, its files, those among them that may know
+# (the bench's adaptors give it the faces of the HAL), and what it judges.
+JUDGES = (
+    (
+        "the bench's physics",
+        ("simulation/bench.h", "simulation/bench/*"),
+        (
+            "simulation/bench/camera*",
+            "simulation/bench/colorimeter*",
+            "simulation/bench/registration*",
+            "simulation/bench/rig*",
+            "simulation/bench/*_test.cc",
+        ),
+        ("render/", "calibration/"),
+    ),
+    (
+        "the studio",
+        ("simulation/studio/*",),
+        ("simulation/studio/*_test.cc",),
+        ("capture/polarisation/", "capture/development/"),
+    ),
 )
-JUDGED_BY_BENCH = ("render/", "calibration/")
 
 # Headers that would make every user of a module depend on a driver's, and the headers of ours that
 # exist to wrap them.
@@ -115,8 +126,9 @@ class Checker:
                     self._check_driver_header(path, line, include)
                 else:
                     self._check_quoted(path, line, include)
-            if matches(path, BENCH_PHYSICS) and not matches(path, BENCH_ADAPTORS):
-                self._check_bench(path)
+            for name, files, may_know, judged in JUDGES:
+                if matches(path, files) and not matches(path, may_know):
+                    self._check_judge(path, name, judged)
         return self.problems
 
     def _check_form(self, path):
@@ -153,10 +165,10 @@ class Checker:
                 f"(floor {self.floors[used]})",
             )
 
-    def _check_bench(self, path):
+    def _check_judge(self, path, name, judged):
         for line, include in self.includes[path]:
-            if chain := self._way_to(include, JUDGED_BY_BENCH, {path}):
-                self._problem(path, line, "the bench's physics reaches " + " -> ".join(chain))
+            if chain := self._way_to(include, judged, {path}):
+                self._problem(path, line, f"{name} reaches " + " -> ".join(chain))
 
     def _way_to(self, include, prefixes, seen):
         """The includes from `include` to a file that begins with one of prefixes; [] if none."""

@@ -32,6 +32,14 @@ SOUND = {
     "simulation/bench/CMakeLists.txt": "veneer_add_module(bench LAYER 6 SRCS s.cc)\n",
     "simulation/bench/projector.h": HEADER + '#include "base/a.h"\n#include "simulation/bench.h"\n',
     "simulation/bench/colorimeter.h": HEADER + '#include "calibration/c.h"\n',
+    "capture/CMakeLists.txt": "veneer_add_module(capture LAYER 3 SRCS c.cc)\n",
+    "capture/plan.h": HEADER,
+    "capture/polarisation/mueller.h": HEADER,
+    "capture/development/CMakeLists.txt": "veneer_add_module(development LAYER 4 SRCS d.cc)\n",
+    "capture/development/set.h": HEADER + '#include "capture/polarisation/mueller.h"\n',
+    "simulation/studio/CMakeLists.txt": "veneer_add_module(studio LAYER 6 SRCS v.cc)\n",
+    "simulation/studio/scene.h": HEADER + '#include "capture/plan.h"\n',
+    "simulation/studio/scene_test.cc": SPDX + '#include "capture/polarisation/mueller.h"\n',
     "tests/end_to_end_test.cc": SPDX + '#include "render/r.h"\n',
     "build/generated/stray.h": "not ours\n",
 }
@@ -90,6 +98,22 @@ class CheckIncludes(unittest.TestCase):
             {"simulation/bench/projector.h": HEADER + '#include "simulation/bench/colorimeter.h"\n'},
             "simulation/bench/projector.h:3:",
             "simulation/bench/colorimeter.h -> calibration/c.h",
+        )
+
+    def test_studio_may_not_include_the_polarisation_or_development_that_it_judges(self):
+        for judged in ("polarisation/mueller.h", "development/set.h"):
+            self.assert_one_problem(
+                {"simulation/studio/scene.h": HEADER + f'#include "capture/{judged}"\n'},
+                "simulation/studio/scene.h:3:",
+                "the studio reaches",
+                judged,
+            )
+
+    def test_studio_may_not_reach_them_through_another_header(self):
+        self.assert_one_problem(
+            {"capture/plan.h": HEADER + '#include "capture/polarisation/mueller.h"\n'},
+            "simulation/studio/scene.h:3:",
+            "capture/plan.h -> capture/polarisation/mueller.h",
         )
 
     def test_circle_of_includes_ends(self):

@@ -279,7 +279,8 @@ TEST(StudioScene, OpenCvFindsTheMarksWhereTheyAre) {
     }
     // Edges as sharp as pixels draw the search to the pixels' middles, each corner to its own side.
     EXPECT_LT(worst, 0.3) << "view " << view;
-    EXPECT_LT(mean.norm(), 0.03) << "view " << view;
+    // What is left of that in the mean of 64 corners; half a pixel would be 0.7.
+    EXPECT_LT(mean.norm(), 0.06) << "view " << view;
   }
 }
 
