@@ -12,7 +12,7 @@ find_package(BZip2 REQUIRED)
 find_package(assimp REQUIRED)
 find_package(embree 3 REQUIRED)
 find_package(CLI11 REQUIRED)
-find_package(OpenCV REQUIRED COMPONENTS core imgproc calib3d photo videoio aruco)
+find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs calib3d photo videoio aruco)
 find_package(Ceres REQUIRED)
 # Its package hands out the static library, whose copies of Eigen's functions are built for SSE2. Linked
 # beside ours, which are built for AVX, the linker takes one of the two for both, and memory is then

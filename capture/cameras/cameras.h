@@ -37,8 +37,23 @@ struct CameraDriver {
 /// Every driver, sorted by name: "aravis" (GenICam over Ethernet and USB3), "folder" (pictures on
 /// disk), "gphoto2" (DSLR), "v4l2".
 [[nodiscard]] std::span<const CameraDriver> camera_drivers();
-/// Opens the camera that the key `driver` of the table names, and sets what all have in common:
-/// pixel_format, gain_db, trigger ("free", "software", "hardware").
+/// Opens the camera that the key `driver` of the table names, and sets what all have in common, in
+/// this order: pixel_format, gain_db, trigger ("free", "software", "hardware"), exposure_s. A key
+/// that is absent leaves the camera as its driver opens it.
+/// Errors: kInvalidOption, and those of the driver and of Camera's setters.
 [[nodiscard]] Result<std::unique_ptr<Camera>> open_camera(TomlReader& config);
+
+/// A driver that could not look for its cameras.
+struct CameraListFailure {
+  std::string_view driver;
+  Error error;
+};
+struct CameraList {
+  std::vector<CameraInfo> found;
+  std::vector<CameraListFailure> failed;
+};
+/// Asks every driver. Takes as long as the slowest bus: a second or two for cameras on Ethernet,
+/// whose answers have to be waited for.
+[[nodiscard]] CameraList list_cameras();
 
 }  // namespace veneer::capture
