@@ -129,14 +129,18 @@ Status Developer::State::find_noise() {
   constexpr std::size_t kMostPairs = 6;
   std::vector<Picture> pairs;
   for (const Shot& shot : recording.shots()) {
-    if (!shot.repeat || pairs.size() >= 2 * kMostPairs) continue;
+    if (!shot.repeat || pairs.size() >= 3 * kMostPairs) continue;
     Shot first = shot;
     first.repeat = false;
     if (!recording.has(first)) continue;
     VENEER_ASSIGN(Picture before, recording.picture(first));
     VENEER_ASSIGN(Picture after, recording.picture(shot));
+    first.dark = true;
+    first.analyser = 0;
+    VENEER_ASSIGN(Picture dark, recording.picture(first));
     pairs.push_back(std::move(before));
     pairs.push_back(std::move(after));
+    pairs.push_back(std::move(dark));
   }
   if (const Result<NoiseModel> measured = measure_noise(pairs)) {
     findings.noise = *measured;

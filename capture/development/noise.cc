@@ -34,7 +34,9 @@ bool repeats(const Picture& a, const Picture& b) {
   if (a.shot.dark && b.shot.dark)
     return a.shot.target == b.shot.target && a.shot.view == b.shot.view &&
            a.shot.analyser == b.shot.analyser;
-  return a.shot == b.shot;
+  Shot first = a.shot;
+  first.repeat = b.shot.repeat;
+  return first == b.shot;
 }
 
 double median_counts(const Picture& picture) {
