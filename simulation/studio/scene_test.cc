@@ -152,6 +152,16 @@ TEST(StudioScene, InTheDarkOnlyTheRoomIsSeen) {
   EXPECT_NEAR(white(65, 45).x(), 0.5 * 0.2 * 0.99, kFloat);
   // The board's first square is ink.
   EXPECT_NEAR(white(18, 10).x(), 0.5 * 0.2 * BoardPicture::kBlack, kFloat);
+  // A texel sends of it what it sends of all lights together.
+  const auto lit = scene.light({Target::kSample, 0, 0, true, 0});
+  Rgb32f sum = Rgb32f::Zero();
+  double cosines = 0;
+  for (int light = 0; light < 3; ++light) {
+    const auto texel = scene.sample().texel(0, light, 4, 4);
+    sum += texel.specular + texel.diffuse;
+    cosines += small_plan().lights[static_cast<std::size_t>(light)].z();
+  }
+  EXPECT_NEAR(lit(kMiddleX, kMiddleY).x(), 0.5 * 0.2 * sum.x() / cosines, kFloat);
   truth.ambient = 0;
   StudioScene black = scene_of(truth, small_plan());
   for (const Target target : {Target::kSample, Target::kMirror, Target::kMirrorBall}) {
@@ -197,7 +207,28 @@ TEST(StudioScene, PixelsOfAMosaicAreBehindTheirOwnAnalysers) {
   }
 }
 
-/// Middle of what is brighter than half of the brightest, weighted.
+TEST(StudioScene, APixelIsTheMeanOfWhatItCovers) {
+  // Texels of 2.5 pixels, the sample's edges in the middle of pixels.
+  StudioTruth truth = small_truth();
+  truth.focal_px = 1000;
+  truth.principal_point = {80.5, 60.5};
+  StudioScene scene = scene_of(truth, small_plan());
+  const auto cross = scene.light({Target::kSample, 0, 0, false, 90 * kDegree});
+  const auto diffuse = [&](int column) {
+    return scene.sample().texel(0, 0, column, 4).diffuse.x();
+  };
+  // Two texels are five pixels; the last of them has a half of the texel after.
+  for (int column = 0; column < 6; column += 2) {
+    const int x = 71 + 5 * column / 2;
+    EXPECT_NEAR(2 * cross(x, 61).x(), diffuse(column), kFloat) << column;
+    EXPECT_NEAR(2 * cross(x + 1, 61).x(), diffuse(column), kFloat) << column;
+    EXPECT_NEAR(2 * cross(x + 3, 61).x(), diffuse(column + 1), kFloat) << column;
+    EXPECT_NEAR(2 * cross(x + 4, 61).x(), 0.5 * (diffuse(column + 1) + diffuse(column + 2)), kFloat)
+        << column;
+  }
+}
+
+/// Middle of what is brighter than a tenth of the brightest, weighted.
 Eigen::Vector2d brightest(const Image<Rgb32f>& picture) {
   float most = 0;
   for (const Rgb32f& pixel : picture.pixels()) most = std::max(most, pixel.y());

@@ -278,6 +278,21 @@ TEST(VirtualStudio, AStudioThatCannotBeIsRefused) {
   EXPECT_THAT(huge.error().what, HasSubstr("size"));
 }
 
+TEST(VirtualStudio, ATileRepeatsOverTheSample) {
+  capture::CapturePlan plan = small_plan();
+  plan.area.height_mm = 12;
+  plan.area.rows = 6;
+  StudioTruth truth = small_truth();
+  truth.tile_mm = 8;  // 4 texels
+  const auto studio = made(truth, plan);
+  const auto diffuse = studio->truth(0, 0).diffuse;
+  ASSERT_EQ(diffuse.height(), 6);
+  for (int row = 0; row < 6; ++row)
+    for (int column = 0; column < 8; ++column)
+      EXPECT_EQ(diffuse(column, row), diffuse(column % 4, row % 4)) << column << ", " << row;
+  EXPECT_NE(diffuse(0, 0), diffuse(1, 0));
+}
+
 TEST(VirtualStudio, GainMakesTheSameLightBrighter) {
   const auto studio = made(small_truth());
   ASSERT_TRUE(studio->camera().set_exposure(0.02));

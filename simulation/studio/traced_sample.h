@@ -18,7 +18,8 @@ class TracedSample {
  public:
   /// @param size  texels along each side of the tile
   /// @param cache  folder in which traced tiles are kept and looked up; empty: none. A damaged one,
-  ///               or one of another make, is traced again.
+  ///               or one of other directions, is traced again; empty it when the materials or the
+  ///               tracer change.
   /// Errors: kInvalidOption, kIo.
   [[nodiscard]] static Result<TracedSample> trace(const StudioTruth& truth,
                                                   int size,
