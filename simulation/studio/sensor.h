@@ -1,28 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <vector>
 
 #include "base/image.h"
-#include "base/random.h"
+#include "simulation/studio/poisson_deviates.h"
 #include "simulation/studio/truth.h"
 
 namespace veneer::simulation::studio {
-
-/// Whole electrons of a small mean.
-class PoissonDeviates {
- public:
-  static constexpr int kMost = 30;  ///< electrons; above, a normal deviate does
-  PoissonDeviates();
-  /// @param mean  at most kMost; 0 or less, or NaN, gives none.
-  [[nodiscard]] int draw(double mean, Pcg32& random) const;
-
- private:
-  // Of every whole mean below kMost: the chances of at most 0, 1, ... electrons.
-  std::array<std::vector<double>, kMost + 1> cumulative_;
-};
 
 /// From light to counts. A colour camera has three chips: every pixel has all three channels, each
 /// with noise and patterns of its own. A mosaic is on one chip, whose counts stand in all three.

@@ -12,9 +12,12 @@
 
 #include "base/random.h"
 #include "simulation/studio/board_picture.h"
-#include "simulation/studio/devices.h"
+#include "simulation/studio/camera.h"
 #include "simulation/studio/geometry.h"
+#include "simulation/studio/hands.h"
 #include "simulation/studio/jones.h"
+#include "simulation/studio/polariser.h"
+#include "simulation/studio/rig.h"
 #include "simulation/studio/scene.h"
 #include "simulation/studio/traced_sample.h"
 

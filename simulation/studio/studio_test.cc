@@ -12,7 +12,10 @@
 #include <limits>
 
 #include "base/files.h"
-#include "simulation/studio/devices.h"
+#include "simulation/studio/camera.h"
+#include "simulation/studio/hands.h"
+#include "simulation/studio/polariser.h"
+#include "simulation/studio/rig.h"
 #include "simulation/studio/testing.h"
 
 namespace veneer::simulation {

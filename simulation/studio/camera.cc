@@ -1,60 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "simulation/studio/devices.h"
+#include "simulation/studio/camera.h"
+
+#include <fmt/format.h>
 
 #include <cmath>
-#include <string_view>
-#include <utility>
 
 #include "base/random.h"
 
 namespace veneer::simulation::studio {
+
 namespace {
 
 // Above all that the sensor draws in.
 constexpr std::uint64_t kFateStream = std::uint64_t{1} << 62U;
 
-Status check_index(std::string_view name, int index, int count) {
-  if (index >= 0 && index < count) return {};
-  return fail(Errc::kInvalidOption,
-              "arranging the studio: there is no {} {}; the plan has 0 to {}",
-              name,
-              index,
-              count - 1);
-}
-
-Status turn_analyser(StudioRig& rig, double angle_rad, double seconds) {
-  if (rig.truth().mosaic)
-    return fail(Errc::kUnavailable,
-                "turning the studio's analyser: its camera has them on the sensor; do not ask for "
-                "angles");
-  if (!std::isfinite(angle_rad))
-    return fail(Errc::kInvalidOption,
-                "turning the studio's analyser: {} is no angle; give radians",
-                angle_rad);
-  rig.pass(seconds);
-  Arrangement arrangement = rig.arrangement();
-  arrangement.analyser_rad = angle_rad;
-  rig.arrange(arrangement);
-  return {};
-}
-
 }  // namespace
-
-StudioRig::StudioRig(
-    StudioScene scene, const StudioTruth& truth, int views, int lights, bool has_mirror)
-    : scene_(std::move(scene)),
-      truth_(truth),
-      views_(views),
-      lights_(lights),
-      has_mirror_(has_mirror) {}
-
-const Image<Rgb32f>& StudioRig::light() {
-  if (lit_ != arrangement_) {
-    light_ = scene_.light(arrangement_);
-    lit_ = arrangement_;
-  }
-  return light_;
-}
 
 StudioCamera::StudioCamera(StudioRig& rig) : rig_(rig), sensor_(rig.truth()) {}
 
@@ -117,43 +77,6 @@ Result<capture::CameraFrame> StudioCamera::grab() {
   frame.sequence = ++exposed_;
   if (truth.repeated > 0) last_ = frame;
   return frame;
-}
-
-Status StudioHands::please(const capture::HandRequest& request) {
-  using Task = capture::HandRequest::Task;
-  Arrangement arrangement = rig_.arrangement();
-  double seconds = kMove_s;
-  switch (request.task) {
-    case Task::kPlaceTarget:
-      if (request.target == capture::Target::kMirror && !rig_.has_mirror())
-        return fail(Errc::kUnavailable,
-                    "placing the studio's mirror: the plan says at no light how it stands; give it "
-                    "[mirror] light, or ask for none");
-      arrangement.target = request.target;
-      break;
-    case Task::kPlaceView:
-      VENEER_TRY(check_index("view", request.index, rig_.views()));
-      arrangement.view = request.index;
-      break;
-    case Task::kPlaceLight:
-      VENEER_TRY(check_index("light", request.index, rig_.lights()));
-      arrangement.light = request.index;
-      break;
-    case Task::kDarken:
-    case Task::kLight:
-      arrangement.dark = request.task == Task::kDarken;
-      seconds = kSwitch_s;
-      break;
-    case Task::kTurnAnalyser:
-      return turn_analyser(rig_, request.angle_rad, kMove_s);
-  }
-  rig_.pass(seconds);
-  rig_.arrange(arrangement);
-  return {};
-}
-
-Status StudioPolariser::turn_to(double angle_rad) {
-  return turn_analyser(rig_, angle_rad, kTurn_s);
 }
 
 }  // namespace veneer::simulation::studio
