@@ -4,9 +4,12 @@
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
+#include <ImfStdIO.h>
+#include <ImfStringAttribute.h>
 
 #include <algorithm>
 #include <exception>
+#include <fstream>
 
 #include "base/files.h"
 #include "base/image_files.h"
@@ -19,7 +22,9 @@ namespace fs = std::filesystem;
 
 }  // namespace
 
-Status write_exr(const fs::path& path, const std::vector<ExrChannel>& channels) {
+Status write_exr(const fs::path& path,
+                 const std::vector<ExrChannel>& channels,
+                 const ExrAttributes& attributes) {
   if (channels.empty() || channels.front().pixels.empty()) {
     return fail(Errc::kInvalidOption, "writing {}: the image is empty", path.string());
   }
@@ -29,6 +34,8 @@ Status write_exr(const fs::path& path, const std::vector<ExrChannel>& channels) 
   try {
     Imf::Header header(width, height);
     header.compression() = Imf::ZIP_COMPRESSION;
+    for (const auto& [name, text] : attributes)
+      header.insert(name, Imf::TypedAttribute<std::string>(text));
     Imf::FrameBuffer frame;
     for (const ExrChannel& channel : channels) {
       VENEER_CHECK(channel.pixels.width() == width && channel.pixels.height() == height);
@@ -41,9 +48,17 @@ Status write_exr(const fs::path& path, const std::vector<ExrChannel>& channels) 
                               sizeof(float),
                               sizeof(float) * static_cast<std::size_t>(width)));
     }
-    Imf::OutputFile file(staged.path().c_str(), header);
-    file.setFrameBuffer(frame);
-    file.writePixels(height);
+    std::ofstream stream(staged.path(), std::ios::binary);
+    {
+      Imf::StdOFStream out(stream, staged.path().c_str());
+      Imf::OutputFile file(out, header);
+      file.setFrameBuffer(frame);
+      file.writePixels(height);
+    }
+    // The table of rows is written by the destructor, which keeps to itself that the disk is full.
+    stream.close();
+    if (!stream)
+      return fail(Errc::kIo, "writing {}: it could not be written to its end", path.string());
   } catch (const std::exception& error) {
     return fail(Errc::kIo, "writing {}: {}", path.string(), error.what());
   }
@@ -66,6 +81,11 @@ Status write_exr(const fs::path& path,
 }
 
 Result<std::vector<ExrChannel>> read_exr(const fs::path& path) {
+  VENEER_ASSIGN(ExrPicture picture, read_exr_picture(path));
+  return std::move(picture.channels);
+}
+
+Result<ExrPicture> read_exr_picture(const fs::path& path) {
   if (std::error_code error; !fs::exists(path, error)) {
     return fail(Errc::kNotFound, "reading {}: there is no such file", path.string());
   }
@@ -77,7 +97,12 @@ Result<std::vector<ExrChannel>> read_exr(const fs::path& path) {
     VENEER_TRY(check_image_size(path, columns, rows));
     const int width = static_cast<int>(columns);
     const int height = static_cast<int>(rows);
-    std::vector<ExrChannel> channels;
+    ExrPicture picture;
+    for (auto it = file.header().begin(); it != file.header().end(); ++it) {
+      if (const auto* text = dynamic_cast<const Imf::TypedAttribute<std::string>*>(&it.attribute()))
+        picture.attributes[it.name()] = text->value();
+    }
+    std::vector<ExrChannel>& channels = picture.channels;
     for (auto it = file.header().channels().begin(); it != file.header().channels().end(); ++it) {
       if (it.channel().xSampling != 1 || it.channel().ySampling != 1) {
         return fail(Errc::kBadFormat,
@@ -100,7 +125,7 @@ Result<std::vector<ExrChannel>> read_exr(const fs::path& path) {
     }
     file.setFrameBuffer(frame);
     file.readPixels(window.min.y, window.max.y);
-    return channels;
+    return picture;
   } catch (const std::exception& error) {
     return fail(Errc::kBadFormat, "reading {}: {}", path.string(), error.what());
   }

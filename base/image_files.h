@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -37,15 +39,25 @@ struct ExrChannel {
   std::string name;
   Image<float> pixels;
 };
+/// What is to be known about a picture, as texts in its header. OpenEXR's own names ("channels",
+/// "dataWindow", ...) are taken: begin with a word and a dot.
+using ExrAttributes = std::map<std::string, std::string>;
 /// @param channels  all of one size; names unique. Stored as 32-bit float, ZIP-compressed.
 [[nodiscard]] Status write_exr(const std::filesystem::path& path,
-                               const std::vector<ExrChannel>& channels);
+                               const std::vector<ExrChannel>& channels,
+                               const ExrAttributes& attributes = {});
 /// Three channels named `names` (default R, G, B).
 [[nodiscard]] Status write_exr(const std::filesystem::path& path,
                                ImageView<const Rgb32f> image,
                                const std::array<std::string, 3>& names = {"R", "G", "B"});
 /// All channels of the first part, converted to float.
 [[nodiscard]] Result<std::vector<ExrChannel>> read_exr(const std::filesystem::path& path);
+struct ExrPicture {
+  std::vector<ExrChannel> channels;
+  ExrAttributes attributes;  ///< those that are texts
+};
+/// The same with what its header says.
+[[nodiscard]] Result<ExrPicture> read_exr_picture(const std::filesystem::path& path);
 /// The three named channels; kBadFormat where one is missing.
 [[nodiscard]] Result<Image<Rgb32f>> read_exr_rgb(const std::filesystem::path& path,
                                                  const std::array<std::string, 3>& names = {

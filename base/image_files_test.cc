@@ -2,6 +2,10 @@
 #include "base/image_files.h"
 
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <limits>
@@ -112,6 +116,55 @@ TEST(Exr, RoundTripsFloatsBitByBit) {
   for (std::size_t c = 0; c < 2; ++c) {
     EXPECT_EQ(read[c].name, channels[c].name);
     EXPECT_TRUE(std::ranges::equal(read[c].pixels.pixels(), channels[c].pixels.pixels()));
+  }
+}
+
+TEST(Exr, KeepsWhatIsToBeKnownAboutThePicture) {
+  const TemporaryFolder folder;
+  const ExrAttributes attributes{
+      {"veneer.exposure_s", "0.033333333333333333"},
+      {"veneer.empty", ""},
+      {"veneer.a_name_that_is_longer_than_the_31_bytes_of_old", std::string(70000, 'x')},
+      {"veneer.camera", "a \"camera\"\nof \xc3\xa9mail"}};
+  std::vector<ExrChannel> channels{{"Y", Image<float>(3, 2, 1.5F)}};
+  ASSERT_TRUE(write_exr(folder.path() / "a.exr", channels, attributes));
+  const auto picture = read_exr_picture(folder.path() / "a.exr");
+  ASSERT_TRUE(picture) << picture.error().what;
+  EXPECT_EQ(picture->attributes, attributes);
+  ASSERT_EQ(picture->channels.size(), 1U);
+  EXPECT_EQ(picture->channels[0].pixels(2, 1), 1.5F);
+  // One of OpenEXR's own that is no text.
+  const Status taken = write_exr(folder.path() / "b.exr", channels, {{"dataWindow", "x"}});
+  ASSERT_FALSE(taken);
+  EXPECT_FALSE(fs::exists(folder.path() / "b.exr"));
+}
+
+// A child whose files may not grow beyond a limit: what a full disk does to a write. The last part
+// of the file is written when it is closed.
+TEST(Exr, OnAFullDiskIsWholeOrNotAtAll) {
+  const TemporaryFolder folder;
+  Image<float> pixels(40, 30);
+  Pcg32 random(3);
+  for (float& pixel : pixels.pixels()) pixel = static_cast<float>(random.next());
+  const std::vector<ExrChannel> channels{{"Y", std::move(pixels)}};
+  ASSERT_TRUE(write_exr(folder.path() / "whole.exr", channels));
+  const auto size = static_cast<rlim_t>(fs::file_size(folder.path() / "whole.exr"));
+  for (const rlim_t limit : {rlim_t{1}, rlim_t{300}, size / 2, size - 100, size - 1, size}) {
+    const fs::path path = folder.path() / std::to_string(limit);
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      ::signal(SIGXFSZ, SIG_IGN);
+      const rlimit most{limit, limit};
+      if (::setrlimit(RLIMIT_FSIZE, &most) != 0) ::_exit(10);
+      const Status written = write_exr(path, channels);
+      ::_exit(written ? 0 : written.error().code == Errc::kIo ? 1 : 2);
+    }
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFEXITED(status));
+    EXPECT_EQ(WEXITSTATUS(status), limit < size ? 1 : 0) << limit << " of " << size;
+    EXPECT_EQ(fs::exists(path), limit >= size) << limit << " of " << size;
   }
 }
 

@@ -238,6 +238,19 @@ void TomlReader::read(std::string_view key, std::vector<double>& value) {
   });
 }
 
+void TomlReader::read(std::string_view key, std::vector<Eigen::Vector2d>& value) {
+  VENEER_TOML_READ("a list of [a, b], each two finite numbers", [&](const toml::node& node) {
+    const toml::array* array = node.as_array();
+    if (array == nullptr) return false;
+    std::vector<Eigen::Vector2d> result(array->size());
+    for (std::size_t i = 0; i < result.size(); ++i) {
+      if (!read_vector<2>(*array->get(i), result[i])) return false;
+    }
+    value = std::move(result);
+    return true;
+  });
+}
+
 void TomlReader::read(std::string_view key, std::vector<int>& value) {
   VENEER_TOML_READ("a list of whole numbers", [&](const toml::node& node) {
     const toml::array* array = node.as_array();

@@ -45,6 +45,7 @@ class TomlReader {
   void read(std::string_view key, Eigen::Matrix3d& value);  ///< three rows of three
   void read(std::string_view key, std::vector<double>& value);
   void read(std::string_view key, std::vector<int>& value);
+  void read(std::string_view key, std::vector<Eigen::Vector2d>& value);
   void read(std::string_view key, std::vector<std::string>& value);
   template <class T>
   void require(std::string_view key, T& value) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "base/rigid_transform.h"
 #include "base/toml_reader.h"
 #include "btf/direction.h"
 
@@ -72,16 +73,16 @@ enum class LightSource : std::uint8_t {
 ///
 ///     [sample]                 # name, columns, rows, left_mm, top_mm, width_mm, height_mm,
 ///     lift_mm [board]                  # as MarkBoard [polarisation]           # axis,
-///     analyser_deg [exposure]               # step, most, frames, multiple_of_s [lights] # from =
-///     "rig" | "mirror-ball" | "projector" arc_deg = [-60, 60, 5]   # in the plane of x and normal:
-///     first, last, step; positive towards x theta_phi_deg = [[30, 0], ...]       # or one by one
-///     ball_radius_mm = 15      # with "mirror-ball"
-///     profile = "PROFILE"      # with "projector": its position; world_from_sample tells where the
-///                              # sample is: sample_position, sample_turn_deg
-///     [views]                  # arc_deg or theta_phi_deg; the normal where absent
-///     [lens]                   # focal_px, principal_point, k1, k2; where absent found from the
-///     views [white]                  # reflectance = 0.99 [mirror]                 # light = 12:
-///     the one at which the leak is measured; absent: no mirror
+///     analyser_deg [exposure]               # step, most, frames, multiple_of_s [lights] from =
+///     "rig"             # or "mirror-ball", "projector" arc_deg = [-60, 60, 5]   # in the plane of
+///     x and normal: first, last, step; positive towards x theta_phi_deg = [[30, 0], [45, 90]]  #
+///     or one by one ball_radius_mm = 15      # with "mirror-ball" profile = "PROFILE"      # with
+///     "projector": its position in the world of its calibration sample_position = [0, 0, 1.5]    #
+///     and where the sample is there, metres, sample_turn_deg = [0, 0, 0]      # and how its local
+///     frame is turned: axis times angle [views]                  # arc_deg or theta_phi_deg; the
+///     normal where absent [lens]                   # focal_px, principal_point, k1, k2; where
+///     absent found from the views [white]                  # reflectance = 0.99 [mirror] # light =
+///     12: at which the leak is measured; absent: no mirror
 struct CapturePlan {
   std::string name;  ///< of the sample, for the record
   MarkBoard board;
@@ -91,12 +92,17 @@ struct CapturePlan {
   LightSource light_source = LightSource::kRig;
   btf::DirectionSet lights;    ///< local frame
   double ball_radius_mm = 15;  ///< with kMirrorBall
-  btf::DirectionSet views;     ///< local frame
+  /// With kProjector: name or folder of the profile. Whoever runs the session puts the direction in
+  /// `lights`, which are empty until then.
+  std::string profile;
+  RigidTransform world_from_sample;  ///< of the sample's local frame; with kProjector
+  btf::DirectionSet views;           ///< local frame
   std::optional<CameraLens> lens;
   double white_reflectance = 0.99;
   std::optional<int> mirror_light;  ///< index into lights
 
-  /// Reads its tables; the caller calls finish(). Mistakes are collected in `toml`.
+  /// Reads its tables; the caller calls finish(), which has the mistakes, those of check()
+  /// included.
   [[nodiscard]] static CapturePlan read(TomlReader& toml);
   /// Errors: kInvalidOption, naming the key, its value and what it may be.
   [[nodiscard]] Status check() const;

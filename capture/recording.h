@@ -44,24 +44,27 @@ struct Picture {
   Time time;  ///< of the first frame
 };
 
-/// The folder of a capture session: plan.toml and camera's description as they were at its
-/// beginning, pictures as EXR with their metadata, journal.jsonl of what is done.
+/// The folder of a capture session: plan and camera as they were at its beginning, pictures as EXR
+/// with their metadata, journal.jsonl of what is done.
 ///
 ///     NAME/session.json                                        identity: plan, camera, version
-///     NAME/journal.jsonl                                       one line a finished picture
+///     NAME/journal.jsonl                                       one line a finished picture, a note
 ///     NAME/sample/view-00/light-12/analyser-0-exposure-2.exr   and -dark
 ///
 /// A picture counts once its journal line is on the disk: whatever was interrupted before is taken
 /// again. One thread, one program at a time.
 class Recording {
  public:
-  /// Begins a session or goes on with one. Errors: kInvalidOption (the folder holds a session of
-  /// another plan or camera, and in what they differ, or something that is no session), kBadFormat
-  /// (a damaged journal), kUnavailable (another program has it open), kIo.
+  /// Begins a session or goes on with one; pictures whose file is gone or of another size are not
+  /// finished then, see warnings(). Errors: kInvalidOption (the folder holds a session of another
+  /// plan or camera, and in what they differ, or something that is no session), kBadFormat (a
+  /// damaged journal, a session of a newer version), kUnavailable (another program has it open),
+  /// kIo.
   [[nodiscard]] static Result<Recording> resume(const std::filesystem::path& folder,
                                                 const CapturePlan& plan,
                                                 const std::string& camera);
-  /// Reads one. Errors: kNotFound, kBadFormat.
+  /// Reads one, while it is being taken too; nothing can be added to it. Errors: kNotFound,
+  /// kBadFormat, kIo.
   [[nodiscard]] static Result<Recording> open(const std::filesystem::path& folder);
   Recording(Recording&&) noexcept;
   ~Recording();
@@ -69,6 +72,8 @@ class Recording {
   [[nodiscard]] const CapturePlan& plan() const;
   [[nodiscard]] const std::filesystem::path& folder() const;
   [[nodiscard]] const std::string& camera() const;
+  /// What was found amiss when it was opened.
+  [[nodiscard]] const std::vector<std::string>& warnings() const;
   /// Finished ones, sorted.
   [[nodiscard]] std::vector<Shot> shots() const;
   [[nodiscard]] bool has(const Shot& shot) const;
@@ -78,7 +83,9 @@ class Recording {
   [[nodiscard]] Status add(const Picture& picture);
   /// Errors: kNotFound, kBadFormat (a picture that was changed or damaged since).
   [[nodiscard]] Result<Picture> picture(const Shot& shot) const;
-  /// What else is to be known later, kept as lines of the journal: "bracket", "movement".
+  /// What else is to be known later, kept as lines of the journal. The session notes
+  /// "bracket sample 0 12" (target, view, light; the exposures in seconds, shortest first) and
+  /// "movement sample 0 12" (see run_session()). Errors: kInvalidOption (no JSON), kIo.
   [[nodiscard]] Status note(const std::string& key, const std::string& json);
   /// The latest of that key; empty where there is none.
   [[nodiscard]] std::string noted(const std::string& key) const;

@@ -8,8 +8,8 @@
 #include <string>
 #include <utility>
 
+#include "base/locked_lines.h"
 #include "base/result.h"
-#include "base/unique_handle.h"
 
 namespace veneer::calibration {
 
@@ -41,12 +41,11 @@ class Journal {
   [[nodiscard]] bool resumed() const { return resumed_; }
 
  private:
-  Journal(std::filesystem::path path, UniqueFd fd) : path_(std::move(path)), fd_(std::move(fd)) {}
+  explicit Journal(LockedLines lines) : lines_(std::move(lines)) {}
   [[nodiscard]] Status append(const nlohmann::json& line);
-  [[nodiscard]] Status take(const std::string& text, const nlohmann::json& identity);
+  [[nodiscard]] Status take(const nlohmann::json& identity);
 
-  std::filesystem::path path_;
-  UniqueFd fd_;  // locked
+  LockedLines lines_;
   std::map<std::pair<std::string, std::string>, nlohmann::json> findings_;
   bool resumed_ = false;
 };
