@@ -10,6 +10,7 @@
 
 #include "base/statistics.h"
 #include "capture/development/internal_board_layout.h"
+#include "capture/development/internal_corner_fit.h"
 #include "capture/development/internal_opencv.h"
 #include "capture/development/rectification.h"
 
@@ -26,14 +27,10 @@ constexpr double kMostUpscale = 3;
 /// bends, below what a marker read wrongly is off by.
 constexpr double kMarkerOffSquares = 0.25;
 constexpr double kLeastInlierRatio = 0.6;  // of the markers read
-/// Half the window in which a corner is refined, of the least distance to its neighbours, so that
-/// only the four squares that meet there are in it, and its bounds in pixels.
-constexpr double kRefineOfSpacing = 0.25;
-constexpr int kLeastRefineWindow = 2;
-constexpr int kMostRefineWindow = 12;
-/// A refined corner that moved further from where its markers say, in squares, was drawn off by
-/// something else: the sample's edge, a reflection.
-constexpr double kMostMoveSquares = 0.1;
+/// A corner is fitted to this part of the squares that meet there.
+constexpr double kReachOfSquare = 0.5;
+/// Below this likeness something else is there: the sample's edge, a reflection, another board.
+constexpr double kLeastLikeness = 0.85;
 /// Corners lie on a line if they leave it by less than this part of their extent.
 constexpr double kLineRatio = 0.05;
 
@@ -161,9 +158,9 @@ void keep_those_that_agree(std::map<int, MarkerCorners>& markers,
 }
 
 struct Guess {
-  int column, row;    ///< of the square below and right of the corner
-  cv::Point2f pixel;  ///< OpenCV's convention
-  double spacing_px;  ///< least distance to a neighbour
+  Eigen::Vector2d board_mm;
+  int id;
+  Eigen::Matrix3d pixel_from_mm;  ///< around it
 };
 
 /// Where the inner corners between two markers that were read should be.
@@ -183,20 +180,25 @@ std::vector<Guess> guess_corners(const std::map<int, MarkerCorners>& markers,
         if (marker == markers.end()) continue;
         const auto own = layout.marker_corners(marker->first);
         for (std::size_t i = 0; i < 4; ++i) {
+          // Around the corner, so that the equations are well conditioned.
           const Eigen::Vector2d place = own[i] / board.square_mm - Eigen::Vector2d(column, row);
           places.emplace_back(static_cast<float>(place.x()), static_cast<float>(place.y()));
           pixels.push_back(marker->second[i]);
         }
       }
       if (pixels.size() != 8) continue;
-      const cv::Mat px_from_squares = cv::findHomography(places, pixels, 0);
-      if (px_from_squares.empty()) continue;
-      std::vector<cv::Point2f> cross{{0, 0}, {1, 0}, {0, 1}, {-1, 0}, {0, -1}};
-      cv::perspectiveTransform(cross, cross, px_from_squares);
-      double spacing = 1e30;
-      for (std::size_t i = 1; i < cross.size(); ++i)
-        spacing = std::min(spacing, cv::norm(cross[i] - cross[0]));
-      guesses.push_back({column, row, cross[0], spacing});
+      const cv::Mat solved = cv::findHomography(places, pixels, 0);
+      if (solved.empty()) continue;
+      Eigen::Matrix3d opencv_from_squares;
+      for (int i = 0; i < 9; ++i)
+        opencv_from_squares(i / 3, i % 3) = solved.at<double>(i / 3, i % 3);
+      Eigen::Matrix3d squares_from_mm = Eigen::Matrix3d::Identity() / board.square_mm;
+      squares_from_mm.col(2) = Eigen::Vector3d(-column, -row, 1);
+      Eigen::Matrix3d pixel_from_opencv = Eigen::Matrix3d::Identity();
+      pixel_from_opencv.col(2) = Eigen::Vector3d(kPixelCentre, kPixelCentre, 1);
+      guesses.push_back({Eigen::Vector2d(column, row) * board.square_mm,
+                         (row - 1) * (board.columns - 1) + column - 1,
+                         pixel_from_opencv * opencv_from_squares * squares_from_mm});
     }
   }
   return guesses;
@@ -222,28 +224,13 @@ Result<FoundMarks> search(const Image<Rgb32f>& picture,
   keep_those_that_agree(markers, layout, board);
 
   FoundMarks found;
-  cv::Mat smooth;  // noise pulls a corner more than this blur, which is even around it
-  cv::GaussianBlur(grey, smooth, {}, 0.7);
   for (const Guess& guess : guess_corners(markers, layout, board)) {
-    const int window = std::clamp(static_cast<int>(kRefineOfSpacing * guess.spacing_px),
-                                  kLeastRefineWindow,
-                                  kMostRefineWindow);
-    const cv::Rect2f inside(static_cast<float>(window + 1),
-                            static_cast<float>(window + 1),
-                            static_cast<float>(grey.cols - 2 * window - 3),
-                            static_cast<float>(grey.rows - 2 * window - 3));
-    if (!inside.contains(guess.pixel)) continue;
-    std::vector<cv::Point2f> corner{guess.pixel};
-    cv::cornerSubPix(smooth,
-                     corner,
-                     {window, window},
-                     {-1, -1},
-                     {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 50, 1e-3});
-    if (!(cv::norm(corner[0] - guess.pixel) < std::max(0.5, kMostMoveSquares * guess.spacing_px)))
-      continue;
-    found.ids.push_back((guess.row - 1) * (board.columns - 1) + guess.column - 1);
-    found.pixels.push_back(from_opencv(corner[0]));
-    found.board_mm.emplace_back(guess.column * board.square_mm, guess.row * board.square_mm);
+    const auto fit = fit_corner(
+        grey, layout, guess.pixel_from_mm, guess.board_mm, kReachOfSquare * board.square_mm);
+    if (!fit || fit->likeness < kLeastLikeness) continue;
+    found.ids.push_back(guess.id);
+    found.pixels.push_back(fit->pixel);
+    found.board_mm.push_back(guess.board_mm);
   }
   if (found.ids.size() < kLeastCorners) {
     return fail(Errc::kNotFound,

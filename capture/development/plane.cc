@@ -23,6 +23,10 @@ constexpr double kOutlierPx = 0.3;
 constexpr double kMostOutliers = 0.2;
 /// A focal length that is not known better than to this part is not known.
 constexpr double kFocalSigma = 0.03;
+constexpr double kFocalTrial = 0.05;      // a focal length that is wrong by this part is tried
+constexpr double kLeastCornerRms = 0.02;  // pixels; no corner is found better
+/// Fewer views tell a focal length; the rest would be bent to their noise.
+constexpr std::size_t kViewsForAll = 3;
 
 Status check_marks(const FoundMarks& marks) {
   if (marks.pixels.size() != marks.board_mm.size() || marks.pixels.size() < kLeastCorners) {
@@ -183,10 +187,14 @@ void set_view(PlaneView& view, const SampleArea& area) {
 struct LensFit {
   CameraLens lens;
   double rms_px = std::numeric_limits<double>::infinity();
-  double focal_sigma = std::numeric_limits<double>::infinity();  ///< in parts of it
 };
 
-LensFit fit_lens(const std::vector<FoundMarks>& views, int width, int height, double start) {
+/// From a start, or with the focal length held.
+LensFit fit_lens(const std::vector<FoundMarks>& views,
+                 int width,
+                 int height,
+                 const CameraLens& start,
+                 bool hold_focal) {
   std::vector<std::vector<cv::Point3f>> places;
   std::vector<std::vector<cv::Point2f>> pixels;
   for (const FoundMarks& view : views) {
@@ -198,18 +206,15 @@ LensFit fit_lens(const std::vector<FoundMarks>& views, int width, int height, do
       pixels.back().push_back(to_opencv(view.pixels[i]));
     }
   }
-  cv::Mat matrix =
-      camera_matrix({.focal_px = {start, start}, .principal_point = {0.5 * width, 0.5 * height}});
-  cv::Mat bending = cv::Mat::zeros(1, 5, CV_64F);
+  cv::Mat matrix = camera_matrix(start);
+  cv::Mat bending = (cv::Mat_<double>(1, 5) << start.k1, start.k2, 0, 0, 0);
   int flags = cv::CALIB_USE_INTRINSIC_GUESS | cv::CALIB_ZERO_TANGENT_DIST | cv::CALIB_FIX_K3 |
               cv::CALIB_FIX_ASPECT_RATIO;
-  // One view tells a focal length; the rest would be bent to its noise.
-  constexpr std::size_t kViewsForAll = 3;
   if (views.size() < kViewsForAll)
     flags |= cv::CALIB_FIX_PRINCIPAL_POINT | cv::CALIB_FIX_K1 | cv::CALIB_FIX_K2;
+  if (hold_focal) flags |= cv::CALIB_FIX_FOCAL_LENGTH;
   std::vector<cv::Mat> rotations;
   std::vector<cv::Mat> translations;
-  cv::Mat sigmas;
   LensFit fit;
   fit.rms_px = cv::calibrateCamera(places,
                                    pixels,
@@ -218,9 +223,6 @@ LensFit fit_lens(const std::vector<FoundMarks>& views, int width, int height, do
                                    bending,
                                    rotations,
                                    translations,
-                                   sigmas,
-                                   cv::noArray(),
-                                   cv::noArray(),
                                    flags,
                                    {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 200, 1e-10});
   fit.lens = {.focal_px = {matrix.at<double>(0, 0), matrix.at<double>(1, 1)},
@@ -228,10 +230,27 @@ LensFit fit_lens(const std::vector<FoundMarks>& views, int width, int height, do
                                   matrix.at<double>(1, 2) + kPixelCentre},
               .k1 = bending.at<double>(0),
               .k2 = bending.at<double>(1)};
-  // With the aspect ratio fixed OpenCV moves only the second focal length.
-  fit.focal_sigma =
-      std::max(sigmas.at<double>(0), sigmas.at<double>(1)) / fit.lens.focal_px.maxCoeff();
   return fit;
+}
+
+/// In parts of the focal length: by how much worse corners fit if it is wrong. What OpenCV itself
+/// says of it is from a pseudo-inverse, and good where nothing is known.
+double focal_sigma(const std::vector<FoundMarks>& views,
+                   int width,
+                   int height,
+                   const LensFit& fit) {
+  double corners = 0;
+  for (const FoundMarks& view : views) corners += static_cast<double>(view.pixels.size());
+  double least = std::numeric_limits<double>::infinity();
+  for (const double factor : {1 - kFocalTrial, 1 + kFocalTrial}) {
+    CameraLens wrong = fit.lens;
+    wrong.focal_px *= factor;
+    const double rms = fit_lens(views, width, height, wrong, true).rms_px;
+    least = std::min(least, rms * rms - fit.rms_px * fit.rms_px);
+  }
+  const double coordinate = std::max(fit.rms_px, kLeastCornerRms) / std::sqrt(2.0);
+  const double chi2 = corners * std::max(least, 0.0) / (coordinate * coordinate);
+  return chi2 > 0 ? kFocalTrial / std::sqrt(chi2) : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace
@@ -249,7 +268,10 @@ Result<CameraLens> calibrate_lens(const std::vector<FoundMarks>& views, int widt
   // The start matters where views are few: a wide, a normal and two long lenses.
   for (const double start : {0.8, 1.6, 3.2, 6.4}) {
     try {
-      const LensFit fit = fit_lens(views, width, height, start * std::max(width, height));
+      const double focal = start * std::max(width, height);
+      const CameraLens lens{.focal_px = {focal, focal},
+                            .principal_point = {0.5 * width, 0.5 * height}};
+      const LensFit fit = fit_lens(views, width, height, lens, false);
       if (check_lens(fit.lens) && fit.rms_px < best.rms_px) best = fit;
     } catch (const cv::Exception&) {
       continue;  // what it throws at is a start that leads nowhere
@@ -269,14 +291,20 @@ Result<CameraLens> calibrate_lens(const std::vector<FoundMarks>& views, int widt
                 best.rms_px,
                 kMostResidualPx);
   }
-  if (!(best.focal_sigma < kFocalSigma)) {
+  double sigma = std::numeric_limits<double>::infinity();
+  try {
+    sigma = focal_sigma(views, width, height, best);
+  } catch (const cv::Exception& error) {
+    return fail(Errc::kBadFormat, "finding the lens: OpenCV says {}", error.what());
+  }
+  if (!(sigma < kFocalSigma)) {
     return fail(Errc::kBadFormat,
                 "finding the lens from {} views: the focal length of {:.0f} px is known only to "
                 "{:.0f} %; give [lens] in the plan, or take views that are tilted by 30 degrees "
                 "and more",
                 views.size(),
                 best.lens.focal_px.x(),
-                100 * best.focal_sigma);
+                std::min(100.0, 100 * sigma));
   }
   return best.lens;
 }

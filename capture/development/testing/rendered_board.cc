@@ -18,9 +18,10 @@ constexpr double kBoardPixelsPerMm = 40;
 
 /// r with r (1 + k1 r^2 + k2 r^4) = bent, by bisection.
 double unbend(const CameraLens& lens, double bent) {
+  if (lens.k1 == 0 && lens.k2 == 0) return bent;
   double low = 0;
   double high = 4 * bent + 1e-9;
-  for (int i = 0; i < 60; ++i) {
+  for (int i = 0; i < 40; ++i) {
     const double r = (low + high) / 2;
     (r * (1 + lens.k1 * r * r + lens.k2 * r * r * r * r) < bent ? low : high) = r;
   }
