@@ -121,10 +121,10 @@ StudioGeometry::StudioGeometry(const StudioTruth& truth, const capture::CaptureP
       vignetting_(truth.vignetting) {
   constexpr int kSide = 4;
   static_assert(kSide * kSide == kRays);
+  auto place = places_.begin();
   for (int j = 0; j < kSide; ++j)
     for (int i = 0; i < kSide; ++i)
-      places_[static_cast<std::size_t>(j * kSide + i)] = {(i + (j + 0.5) / kSide) / kSide,
-                                                          (j + (i + 0.5) / kSide) / kSide};
+      *place++ = {(i + (j + 0.5) / kSide) / kSide, (j + (i + 0.5) / kSide) / kSide};
 }
 
 RigidTransform StudioGeometry::local_from_camera(int view) const {

@@ -93,8 +93,8 @@ TEST(StudioScene, TexelsComeThroughAPerfectStudioAsTheyAre) {
         // Each of the 16 pixels of the texel.
         for (int y = 0; y < 4; ++y)
           for (int x = 0; x < 4; ++x) {
-            const Eigen::Vector3f a = parallel(64 + 4 * column + x, 44 + 4 * row + y);
-            const Eigen::Vector3f b = cross(64 + 4 * column + x, 44 + 4 * row + y);
+            const Eigen::Vector3f& a = parallel(64 + 4 * column + x, 44 + 4 * row + y);
+            const Eigen::Vector3f& b = cross(64 + 4 * column + x, 44 + 4 * row + y);
             const Eigen::Vector3f specular = static_cast<float>(2 * s / (s + p)) * texel.specular;
             ASSERT_NEAR((2 * b - texel.diffuse).norm(), 0, kFloat) << column << ", " << row;
             ASSERT_NEAR((a - b - specular).norm(), 0, kFloat * (1 + specular.norm()));
@@ -198,7 +198,7 @@ TEST(StudioScene, PixelsOfAMosaicAreBehindTheirOwnAnalysers) {
         const auto whole = turned.light({target, 0, 0, false, angles[row][column] * kDegree});
         for (int y = row; y < 120; y += 2)
           for (int x = column; x < 160; x += 2) {
-            const Rgb32f seen = whole(x, y);
+            const Rgb32f& seen = whole(x, y);
             const double luminance = 0.2126 * seen.x() + 0.7152 * seen.y() + 0.0722 * seen.z();
             ASSERT_NEAR(raw(x, y).x(), luminance, kFloat * (1 + luminance)) << x << ", " << y;
             ASSERT_EQ(raw(x, y).x(), raw(x, y).z());

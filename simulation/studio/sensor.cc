@@ -103,7 +103,7 @@ Image<Rgb16> StudioSensor::expose(const Image<Rgb32f>& light,
           float counts =
               std::clamp(got * counts_per_electron + offsets_[3 * pixel + channel], 0.0F, scale);
           if (exponent != 1) counts = scale * std::pow(counts / scale, exponent);
-          picture.pixels()[pixel][channel] = static_cast<std::uint16_t>(counts + 0.5F);
+          picture.pixels()[pixel][channel] = static_cast<std::uint16_t>(std::rint(counts));
         }
       if (channels == 1)
         for (std::size_t pixel = y * width; pixel < (y + 1) * width; ++pixel)

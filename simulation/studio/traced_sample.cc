@@ -131,7 +131,8 @@ Result<TracedSample> TracedSample::trace(const StudioTruth& truth,
 }
 
 std::size_t TracedSample::place(int view, int light, int column, int row) const {
-  const auto tile = static_cast<std::size_t>(view * lights_ + light);
+  const auto tile = static_cast<std::size_t>(view) * static_cast<std::size_t>(lights_) +
+                    static_cast<std::size_t>(light);
   const auto size = static_cast<std::size_t>(size_);
   return (tile * size + static_cast<std::size_t>(row % size_)) * size +
          static_cast<std::size_t>(column % size_);
