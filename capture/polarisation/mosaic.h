@@ -20,11 +20,12 @@ namespace veneer::capture {
 
 /// The four readings of every cell of a mosaic, without interpolation: a picture of half the width
 /// and height (a quarter, with colour: a cell is then 4 x 4 and has R, the mean of both G, and B).
+/// A pixel has seen one colour: of a monochrome mosaic the first channel is read.
 struct MosaicCells {
   /// For each angle; a monochrome one repeats its value.
   std::array<Image<Rgb32f>, 4> counts;
-  /// 1 where a pixel of the cell was at full scale: one clipped angle fakes a degree of
-  /// polarisation.
+  /// 1 where a pixel of the cell was at full scale, or no number: one clipped angle fakes a degree
+  /// of polarisation.
   Image<std::uint8_t> saturated;
 };
 /// Errors: kBadFormat (a size that is no whole number of cells; a frame without a mosaic).
@@ -33,8 +34,9 @@ struct MosaicCells {
                                                Mosaic mosaic);
 
 /// The same at full resolution: every angle (and colour) interpolated between its own pixels, so
-/// that what is linear in space comes back exactly, borders included. A pixel is saturated where
-/// any that it was interpolated from was. Errors: as of mosaic_cells().
+/// that what is linear in space comes back exactly, borders included (along a side of one cell
+/// only: what is constant). A pixel is saturated where any that it was interpolated from was.
+/// Errors: as of mosaic_cells().
 [[nodiscard]] Result<MosaicCells> demosaic(const Image<Rgb32f>& counts,
                                            double full_scale,
                                            Mosaic mosaic);

@@ -37,7 +37,7 @@ struct FresnelAmplitudes {
   [[nodiscard]] double p_reflectance() const { return p * p; }
   [[nodiscard]] double mean_reflectance() const { return 0.5 * (s * s + p * p); }
 };
-/// From air into a medium.
+/// From air into a medium. An index of 1 reflects nothing.
 /// @param cos_incidence  in [0, 1], cut to it.   @param index  of refraction, real, at least 1.
 /// Source: Born and Wolf 1999, "Principles of Optics", 7th edition, section 1.5.2.
 [[nodiscard]] FresnelAmplitudes fresnel_amplitudes(double cos_incidence, double index);
@@ -46,8 +46,10 @@ struct FresnelAmplitudes {
 /// surface, local frame): from the light's basis, whose x is the vector nearest to `light_axis`
 /// perpendicular to the light, to the camera's, whose x is the one nearest to `view_axis`
 /// perpendicular to the view. In units of reflectance. Where light and view are one, the plane of
-/// incidence is any.
-/// Errors: kInvalidOption (an axis along its ray, view opposite to light).
+/// incidence is any. Light and view swapped give the transpose with the signs of S2 changed on
+/// either side, since who looks into the light then stands on the other side.
+/// Errors: kInvalidOption (an axis along its ray, view opposite to light, a direction without
+/// length, an index below 1).
 [[nodiscard]] Result<Mueller> facet_reflection(const Eigen::Vector3d& light,
                                                const Eigen::Vector3d& view,
                                                const Eigen::Vector3d& light_axis,

@@ -18,10 +18,11 @@ using LinearStokes = Eigen::Vector3d;
 class StokesSolver {
  public:
   /// @param extinction  Imax / Imin of the analyser, above 1; infinity is a perfect one.
-  /// Errors: kInvalidOption (angles that do not span, an extinction that is not above 1).
+  /// Errors: kInvalidOption (angles that do not span or nearly so, which is where noise would be
+  /// amplified more than a hundred times; an extinction that is not above 1).
   [[nodiscard]] static Result<StokesSolver> create(std::span<const double> angles_rad,
                                                    double extinction);
-  /// @param readings  one for each angle.
+  /// @param readings  one for each angle. What is no number stays none.
   [[nodiscard]] LinearStokes solve(std::span<const double> readings) const;
   /// The readings' covariance is diag(variance): that of the parameters.
   [[nodiscard]] Eigen::Matrix3d covariance(std::span<const double> variance) const;
@@ -34,7 +35,8 @@ class StokesSolver {
   Eigen::MatrixXd inverse_;  // [3 x angles]
 };
 
-/// sqrt(S1^2 + S2^2) / S0; 0 where S0 <= 0. Noise can bring it above 1; it is not cut.
+/// sqrt(S1^2 + S2^2) / S0; 0 where S0 <= 0 or is no number. Noise can bring it above 1; it is not
+/// cut.
 [[nodiscard]] double degree_of_polarisation(const LinearStokes& stokes);
 /// Half the azimuth of (S1, S2), radians in [0, pi); 0 for unpolarised light.
 [[nodiscard]] double angle_of_polarisation(const LinearStokes& stokes);
