@@ -65,7 +65,7 @@ struct Encoding {
 constexpr std::array kEncodings{Encoding{0, false}, Encoding{1.0, false}, Encoding{0.7, true}};
 
 cv::Mat encoded(const cv::Mat& grey, double bright, const Encoding& encoding) {
-  cv::Mat light = grey;
+  cv::Mat light = grey.clone();  // a copy of a Mat shares its pixels
   if (encoding.blur_px > 0) cv::GaussianBlur(grey, light, {}, encoding.blur_px);
   if (encoding.local) {
     constexpr double kNeighbourhood = 0.03;  // of the long side
