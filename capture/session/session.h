@@ -32,10 +32,14 @@ struct SessionOutcome {
 
 /// Takes what the plan asks for and is not there yet: for each target (white, mirror, ball,
 /// sample), view and light a bracket of exposures chosen from the histogram, once behind each angle
-/// of the analyser, and the same without the projector's light. While it goes on it checks for
-/// saturation and for movement (the last picture of a direction repeats the first), and says how
-/// long the rest will take. Errors: those of Recording::resume(), of the devices (the session goes
-/// on from there when it is run again), kIo.
+/// of the analyser, and the same without the projector's light. Mirror and ball are taken from view
+/// 0 alone, the mirror at the plan's one light. Lights go forth and back, so that as little as
+/// possible is moved; the analyser comes back to where it was at the beginning of a direction, so
+/// that its last picture can repeat the first: what moved, or a light that changed by more than
+/// 1 %, is a warning and noted ("movement sample 0 12": moved, movement, light, see Change).
+/// Progress says how long the rest will take. Errors: those of Recording::resume(), of the devices
+/// (the session goes on from there when it is run again), kInvalidOption (a plan without lights, or
+/// one that asks for a polariser where there is none), kIo.
 [[nodiscard]] Result<SessionOutcome> run_session(const CapturePlan& plan,
                                                  const std::filesystem::path& folder,
                                                  const CaptureDevices& devices,
