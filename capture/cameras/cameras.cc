@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "capture/cameras/aravis/aravis_camera.h"
 #include "capture/cameras/folder/folder_camera.h"
 
 namespace veneer::capture {
@@ -17,6 +18,10 @@ Result<std::unique_ptr<Camera>> open_as_camera(TomlReader& config) {
 }
 
 constexpr std::array kCameras{
+    CameraDriver{"aravis",
+                 "GenICam cameras over Ethernet and USB3",
+                 &open_as_camera<AravisCamera>,
+                 &AravisCamera::list},
     CameraDriver{"folder",
                  "pictures on disk, of a RAW-converted series for example",
                  &open_as_camera<FolderCamera>,
