@@ -5,6 +5,7 @@
 #include "base/parallel.h"
 #include "btf/models/matrix_product.h"
 #include "calibration/instruments/instruments.h"
+#include "capture/cameras/cameras.h"
 #include "cli/commands/commands.h"
 #include "cli/ranks/ranks.h"
 #include "projector/outputs/window/displays.h"
@@ -69,6 +70,36 @@ Instruments look_at_instruments() {
   return result;
 }
 
+struct Cameras {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  nlohmann::ordered_json failed = nlohmann::ordered_json::array();
+  std::string text;
+};
+
+/// The cameras that answer, and what stands in the way of using or of finding them.
+Cameras look_at_cameras() {
+  Cameras result;
+  const capture::CameraList list = capture::list_cameras();
+  for (const capture::CameraInfo& each : list.found) {
+    result.json.push_back({{"driver", each.driver},
+                           {"model", each.model},
+                           {"identity", each.identity},
+                           {"state", each.state}});
+    result.text += fmt::format("\ncamera   {} \"{}\" ({}){}{}",
+                               each.driver,
+                               each.identity,
+                               each.model,
+                               each.state.empty() ? "" : ": ",
+                               each.state);
+  }
+  for (const capture::CameraListFailure& each : list.failed) {
+    result.failed.push_back({{"driver", each.driver}, {"problem", each.error.what}});
+    result.text += fmt::format("\ncamera   {}: {}", each.driver, each.error.what);
+  }
+  if (result.text.empty()) result.text = "\ncamera   none answers";
+  return result;
+}
+
 /// The displays of the desktop; none where there is no desktop, which a daemon does not need.
 nlohmann::ordered_json look_at_displays(std::string& text) {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
@@ -95,6 +126,8 @@ Result<int> run_doctor(CommandLine& line) {
   const std::string blas = btf::blas_description();
   const Trackers trackers = look_at_trackers();
   const Instruments instruments = look_at_instruments();
+  line.note("asking for cameras; those on Ethernet have a second to answer");
+  const Cameras cameras = look_at_cameras();
   std::string displays_text;
   const nlohmann::ordered_json displays = look_at_displays(displays_text);
   line.print({{"gl", gl},
@@ -104,8 +137,10 @@ Result<int> run_doctor(CommandLine& line) {
               {"threads", thread_count()},
               {"trackers", trackers.json},
               {"instruments", instruments.json},
+              {"cameras", cameras.json},
+              {"cameras_failed", cameras.failed},
               {"displays", displays}},
-             fmt::format("OpenGL   {}{}\nBLAS     {}\nMPI      {}\nthreads  {}{}{}{}",
+             fmt::format("OpenGL   {}{}\nBLAS     {}\nMPI      {}\nthreads  {}{}{}{}{}",
                          egl ? "" : "not usable: ",
                          gl,
                          blas,
@@ -113,6 +148,7 @@ Result<int> run_doctor(CommandLine& line) {
                          thread_count(),
                          trackers.text,
                          instruments.text,
+                         cameras.text,
                          displays_text));
   return egl && trackers.all_usable ? kExitDone : kExitFailed;
 }
