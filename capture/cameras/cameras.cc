@@ -8,6 +8,7 @@
 
 #include "capture/cameras/aravis/aravis_camera.h"
 #include "capture/cameras/folder/folder_camera.h"
+#include "capture/cameras/gphoto2/gphoto2_camera.h"
 
 namespace veneer::capture {
 namespace {
@@ -26,6 +27,7 @@ constexpr std::array kCameras{
                  "pictures on disk, of a RAW-converted series for example",
                  &open_as_camera<FolderCamera>,
                  &FolderCamera::list},
+    CameraDriver{"gphoto2", "DSLR and mirrorless cameras", &open_gphoto2, &list_gphoto2},
 };
 static_assert(std::ranges::is_sorted(kCameras, {}, &CameraDriver::name));
 
