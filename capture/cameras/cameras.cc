@@ -9,6 +9,7 @@
 #include "capture/cameras/aravis/aravis_camera.h"
 #include "capture/cameras/folder/folder_camera.h"
 #include "capture/cameras/gphoto2/gphoto2_camera.h"
+#include "capture/cameras/v4l2/v4l2_camera.h"
 
 namespace veneer::capture {
 namespace {
@@ -28,6 +29,7 @@ constexpr std::array kCameras{
                  &open_as_camera<FolderCamera>,
                  &FolderCamera::list},
     CameraDriver{"gphoto2", "DSLR and mirrorless cameras", &open_gphoto2, &list_gphoto2},
+    CameraDriver{"v4l2", "webcams", &open_v4l2, &list_v4l2},
 };
 static_assert(std::ranges::is_sorted(kCameras, {}, &CameraDriver::name));
 
