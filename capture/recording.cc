@@ -51,7 +51,8 @@ json json_of(const Shot& shot) {
           {"light", shot.light},
           {"analyser", shot.analyser},
           {"exposure", shot.exposure},
-          {"dark", shot.dark}};
+          {"dark", shot.dark},
+          {"repeat", shot.repeat}};
 }
 
 std::optional<Shot> shot_from(const json& object) {
@@ -72,20 +73,25 @@ std::optional<Shot> shot_from(const json& object) {
     if (!number.is_number_unsigned() || number.get<std::uint64_t>() > 1000000) return std::nullopt;
     *value = number.get<int>();
   }
-  const json dark = object.value("dark", json());
-  if (!dark.is_boolean()) return std::nullopt;
-  shot.dark = dark.get<bool>();
+  const std::array<std::pair<const char*, bool*>, 2> flags{
+      {{"dark", &shot.dark}, {"repeat", &shot.repeat}}};
+  for (const auto& [key, value] : flags) {
+    const json flag = object.value(key, json());
+    if (!flag.is_boolean()) return std::nullopt;
+    *value = flag.get<bool>();
+  }
   return shot;
 }
 
 std::string name_of(const Shot& shot) {
-  return fmt::format("{}/view-{:02}/light-{:02}/analyser-{}-exposure-{}{}.exr",
+  return fmt::format("{}/view-{:02}/light-{:02}/analyser-{}-exposure-{}{}{}.exr",
                      text_of(shot.target),
                      shot.view,
                      shot.light,
                      shot.analyser,
                      shot.exposure,
-                     shot.dark ? "-dark" : "");
+                     shot.dark ? "-dark" : "",
+                     shot.repeat ? "-repeat" : "");
 }
 
 template <class Number>
@@ -314,6 +320,7 @@ Status Recording::add(const Picture& picture) {
       {"veneer.analyser", fmt::format("{}", shot.analyser)},
       {"veneer.exposure", fmt::format("{}", shot.exposure)},
       {"veneer.dark", shot.dark ? "1" : "0"},
+      {"veneer.repeat", shot.repeat ? "1" : "0"},
       {"veneer.exposure_s", fmt::format("{}", picture.exposure_s)},
       {"veneer.full_scale", fmt::format("{}", picture.full_scale)},
       {"veneer.frames", fmt::format("{}", picture.frames)},

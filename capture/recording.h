@@ -49,7 +49,7 @@ struct Picture {
 ///
 ///     NAME/session.json                                        identity: plan, camera, version
 ///     NAME/journal.jsonl                                       one line a finished picture, a note
-///     NAME/sample/view-00/light-12/analyser-0-exposure-2.exr   and -dark
+///     NAME/sample/view-00/light-12/analyser-0-exposure-2.exr   and -dark, -repeat
 ///
 /// A picture counts once its journal line is on the disk: whatever was interrupted before is taken
 /// again. One thread, one program at a time.

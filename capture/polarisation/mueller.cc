@@ -34,7 +34,7 @@ Result<Basis> basis_across(const Eigen::Vector3d& to_source,
                 axis.x(),
                 axis.y(),
                 axis.z());
-  return Basis{x.normalized(), to_source.cross(x).normalized()};
+  return Basis{x.normalized(), x.cross(to_source).normalized()};
 }
 
 /// Of a vector across the ray, counter-clockwise from x.

@@ -8,7 +8,7 @@
 namespace veneer::capture {
 
 // Light that travels along a unit vector d, described with respect to a basis (x, y) perpendicular
-// to d with x cross y = -d: for who looks into the light (as a camera does), y is 90 degrees
+// to d with x cross y = d: for who looks into the light (as a camera does), y is 90 degrees
 // counter-clockwise from x. Every function says which basis its light has on either side; nothing
 // is implied.
 

@@ -153,10 +153,10 @@ TEST(FacetReflection, AgreesWithTheFieldsFollowedInSpace) {
     const Vector3d p_out = s.cross(view);
     for (const double turn : {0.0, 0.4, 1.3}) {
       const Vector3d x = across(light_axis, light);
-      const Vector3d field = Eigen::AngleAxisd(turn, light) * x;  // ccw for who looks to the light
+      const Vector3d field = Eigen::AngleAxisd(turn, -light) * x;  // ccw for who looks to the light
       const Vector3d out = r.s * field.dot(s) * s + r.p * field.dot(p_in) * p_out;
       for (const double analyser : {0.0, 0.9, 2.0}) {
-        const Vector3d passed = Eigen::AngleAxisd(analyser, -view) * across(view_axis, view);
+        const Vector3d passed = Eigen::AngleAxisd(analyser, view) * across(view_axis, view);
         const double expected = std::pow(out.dot(passed), 2);
         const double found =
             (polariser(analyser, kInfinity) * *reflection * polarised_light(turn))[0];
