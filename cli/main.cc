@@ -19,6 +19,7 @@ constexpr std::array kCommands{
     Command{"calibrate",
             "Lead through measuring a projector and write its profile",
             &cli::run_calibrate},
+    Command{"capture", "Look at samples under polarised light", &cli::run_capture},
     Command{"compare",
             "Fit every model of the literature and print the published tables",
             &cli::run_compare},

@@ -7,6 +7,7 @@ namespace veneer::cli {
 
 Result<int> run_bench(CommandLine& line);
 Result<int> run_calibrate(CommandLine& line);
+Result<int> run_capture(CommandLine& line);
 Result<int> run_compare(CommandLine& line);
 Result<int> run_demo(CommandLine& line);
 Result<int> run_doctor(CommandLine& line);
