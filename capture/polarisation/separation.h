@@ -100,8 +100,9 @@ struct RigPolarisation {
 };
 
 /// Contrasts with which separate() finds all specular light at that pair: what leaks because the
-/// plane of polarisation turns is put back. Exact for a rig that is as said; with `rig` left as it
-/// is and a rig of 100:1, 3 degrees, predicted_error() bounds what remains from above.
+/// plane of polarisation turns is put back. Exact for a rig that is as said. What a misalignment
+/// adds has its sign, so where it is not known the correction pays only away from s and p
+/// (docs/polarisation.md has figures).
 [[nodiscard]] Contrasts with_turned_plane(const Contrasts& contrasts,
                                           const FresnelPrediction& prediction,
                                           const RigPolarisation& rig = {});
