@@ -13,15 +13,17 @@ namespace veneer::capture {
 namespace {
 
 constexpr int kOpenCvEntries = 256;
-constexpr int kNodes = 65;               // of the refined curve
+constexpr int kNodes = 40;               // of the refined curve, evenly in the logarithm of counts
+constexpr int kEntries = 1025;           // of the table that is handed on
 constexpr int kMostSamples = 60000;      // of pixels in a channel
 constexpr double kLeastFraction = 0.02;  // of full scale; below it noise is most of a ratio
-constexpr double kMostFraction = 0.97;   // above it frames begin to saturate
+constexpr double kMostFraction = 0.99;   // above it frames begin to saturate
 constexpr double kCoveredFrom = 0.15;    // what light has to reach down to
 constexpr double kCoveredTo = 0.85;      // and up to
-/// Weight of the curve's smoothness against that of pixels: second differences of the refinement
-/// over the nodes, so that noise does not make steps.
-constexpr double kSmoothness = 0.3;
+/// Weight of the refined curve's second differences against that of all pairs. Power laws have
+/// none: a linear camera and a gamma come out whatever it is.
+constexpr double kSmoothness = 1e-2;
+constexpr double kLeastPower = 0.2, kMostPower = 5;  // by which light goes with counts near black
 constexpr std::size_t kLeastPairs = 200;
 
 struct Shots {
@@ -159,99 +161,113 @@ std::vector<double> rising(const std::vector<double>& values) {
   return result;
 }
 
-/// OpenCV's curve at the nodes: smoothed, rising, 0 at 0 and 1 at 1; a straight line where it is
-/// none.
-std::vector<double> start_curve(const std::vector<cv::Vec3f>& entries, int channel) {
-  std::vector<double> nodes;
+double node_fraction(double node) {
+  return kLeastFraction * std::pow(1 / kLeastFraction, node / (kNodes - 1));
+}
+
+/// A curve as the logarithm of light at nodes; 0 at full scale.
+class LogCurve {
+ public:
+  explicit LogCurve(std::vector<double> logs) : logs_(std::move(logs)) {}
+  struct Place {
+    int below = 0;
+    double part = 0;
+  };
+  [[nodiscard]] static Place place_of(double fraction) {
+    const double scaled = std::log(fraction / kLeastFraction) / std::log(1 / kLeastFraction);
+    const double node = std::clamp(scaled, 0.0, 1.0) * (kNodes - 1);
+    const int below = std::min(static_cast<int>(node), kNodes - 2);
+    return {below, node - below};
+  }
+  /// Below the nodes a power law goes on.
+  [[nodiscard]] double light(double fraction) const {
+    if (!(fraction > 0)) return 0;
+    if (fraction < kLeastFraction) {
+      const double power = (logs_[4] - logs_[0]) / std::log(node_fraction(4) / node_fraction(0));
+      return std::exp(logs_[0]) *
+             std::pow(fraction / kLeastFraction, std::clamp(power, kLeastPower, kMostPower));
+    }
+    const auto [below, part] = place_of(fraction);
+    return std::exp((1 - part) * logs_[static_cast<std::size_t>(below)] +
+                    part * logs_[static_cast<std::size_t>(below + 1)]);
+  }
+  [[nodiscard]] std::vector<double> table() const {
+    std::vector<double> light_at;
+    for (int i = 0; i < kEntries; ++i)
+      light_at.push_back(light(static_cast<double>(i) / (kEntries - 1)));
+    return rising(light_at);
+  }
+
+ private:
+  std::vector<double> logs_;
+};
+
+/// OpenCV's curve at the nodes: smoothed and rising; linear where it is none.
+LogCurve start_curve(const std::vector<cv::Vec3f>& entries, int channel) {
+  std::vector<double> logs;
   for (int k = 0; k < kNodes; ++k) {
     constexpr int kHalf = 3;
     // The ends are hardly seen; both methods leave them wild.
-    const int middle = std::clamp(k * (kOpenCvEntries - 1) / (kNodes - 1), 5, 248);
+    const int middle =
+        std::clamp(static_cast<int>(std::round(node_fraction(k) * (kOpenCvEntries - 1))), 4, 250);
     std::vector<double> around;
     for (int i = -kHalf; i <= kHalf; ++i)
       around.push_back(entries[static_cast<std::size_t>(middle + i)][channel]);
-    nodes.push_back(quantile(around, 0.5));
+    const double light = quantile(around, 0.5);
+    logs.push_back(light > 0 && std::isfinite(light) ? std::log(light)
+                                                     : std::log(node_fraction(k)));
   }
-  nodes = rising(nodes);
-  const double first = nodes.front();
-  const double range = nodes.back() - first;
-  for (int k = 0; k < kNodes; ++k) {
-    double& node = nodes[static_cast<std::size_t>(k)];
-    node = std::isfinite(range) && range > 0 ? (node - first) / range
-                                             : static_cast<double>(k) / (kNodes - 1);
-  }
-  return nodes;
-}
-
-/// Adds a place of the curve, times `factor`, to an equation over the nodes.
-void add_place(Eigen::VectorXd& row, double fraction, double factor) {
-  const double scaled = std::clamp(fraction, 0.0, 1.0) * (kNodes - 1);
-  const int below = std::min(static_cast<int>(scaled), kNodes - 2);
-  row[below] += factor * (1 - (scaled - below));
-  row[below + 1] += factor * (scaled - below);
+  logs = rising(logs);
+  const double last = logs.back();
+  for (double& log : logs) log -= last;
+  return LogCurve(logs);
 }
 
 /// On counts of full depth: the curve whose light in two exposures is as their times are, by least
-/// squares; it is linear in the nodes. Each pair counts by its light, so that bright ones do not
-/// decide alone.
-std::vector<double> refine(const std::vector<Pair>& pairs, const std::vector<double>& start) {
-  std::vector<double> nodes = start;
-  for (int round = 0; round < 4; ++round) {
+/// squares in its logarithm (Debevec and Malik 1997, equation 3), over the logarithm of counts.
+/// Dark is taken off by what the curve of the round before says of it.
+LogCurve refine(const std::vector<Pair>& pairs, const LogCurve& start) {
+  LogCurve curve = start;
+  for (int round = 0; round < 5; ++round) {
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(kNodes, kNodes);
-    const auto place = [&](double fraction) {
-      Eigen::VectorXd row = Eigen::VectorXd::Zero(kNodes);
-      add_place(row, fraction, 1);
-      return row.dot(Eigen::Map<const Eigen::VectorXd>(nodes.data(), kNodes));
-    };
-    Eigen::VectorXd row(kNodes);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(kNodes);
+    double weights = 0;
     for (const Pair& pair : pairs) {
-      row.setZero();
-      add_place(row, pair.longer, 1);
-      add_place(row, pair.longer_dark, -1);
-      add_place(row, pair.shorter, -pair.ratio);
-      add_place(row, pair.shorter_dark, pair.ratio);
-      // Noise of counts, even over the range, makes this much in the equation.
-      const double slope_longer = (place(pair.longer + 0.01) - place(pair.longer - 0.01)) / 0.02;
-      const double slope_shorter = (place(pair.shorter + 0.01) - place(pair.shorter - 0.01)) / 0.02;
-      const double noise2 =
-          slope_longer * slope_longer * (0.05 + pair.longer) +
-          pair.ratio * pair.ratio * slope_shorter * slope_shorter * (0.05 + pair.shorter);
-      const double weight = 1 / (noise2 + 1e-6);
-      // Only eight nodes are not zero.
-      std::array<int, 8> used{};
-      int count = 0;
-      for (int k = 0; k < kNodes; ++k)
-        if (row[k] != 0 && count < 8) used[static_cast<std::size_t>(count++)] = k;
-      for (int a = 0; a < count; ++a)
-        for (int b = 0; b < count; ++b) {
-          const int ka = used[static_cast<std::size_t>(a)];
-          const int kb = used[static_cast<std::size_t>(b)];
-          normal(ka, kb) += weight * row[ka] * row[kb];
-        }
+      const double longer = 1 - curve.light(pair.longer_dark) / curve.light(pair.longer);
+      const double shorter = 1 - curve.light(pair.shorter_dark) / curve.light(pair.shorter);
+      if (!(longer > 0.5 && shorter > 0.5)) continue;  // hardly above dark
+      const double wanted = std::log(pair.ratio) - std::log(longer) + std::log(shorter);
+      // Shot noise and some of reading, in parts of the counts.
+      const auto noise = [](double fraction) { return (0.02 + fraction) / (fraction * fraction); };
+      const double weight = 1 / (noise(pair.longer) + noise(pair.shorter));
+      const auto [l, l_part] = LogCurve::place_of(pair.longer);
+      const auto [s, s_part] = LogCurve::place_of(pair.shorter);
+      const std::array<std::pair<int, double>, 4> terms{
+          {{l, 1 - l_part}, {l + 1, l_part}, {s, s_part - 1}, {s + 1, -s_part}}};
+      for (const auto& [a, factor_a] : terms) {
+        right[a] += weight * factor_a * wanted;
+        for (const auto& [b, factor_b] : terms) normal(a, b) += weight * factor_a * factor_b;
+      }
+      weights += weight;
     }
-    normal /= static_cast<double>(pairs.size());
-    // Smooth: second differences against what the slopes are anyway.
-    for (int k = 1; k + 1 < kNodes; ++k) {
-      Eigen::Matrix3d bend;
-      const Eigen::Vector3d second(1, -2, 1);
-      bend = kSmoothness * second * second.transpose();
-      normal.block<3, 3>(k - 1, k - 1) += bend;
-    }
-    // The ends are held: 0 at 0, 1 at 1.
-    const int inner = kNodes - 2;
-    const Eigen::MatrixXd matrix = normal.block(1, 1, inner, inner);
-    const Eigen::VectorXd right = -normal.block(1, kNodes - 1, inner, 1);
-    const Eigen::VectorXd solved = matrix.ldlt().solve(right);
+    if (!(weights > 0)) return start;
+    normal /= weights;
+    right /= weights;
+    const Eigen::Vector3d second(1, -2, 1);
+    for (int k = 1; k + 1 < kNodes; ++k)
+      normal.block<3, 3>(k - 1, k - 1) += kSmoothness * second * second.transpose();
+    // The last is held at 0.
+    const Eigen::MatrixXd matrix = normal.topLeftCorner(kNodes - 1, kNodes - 1);
+    const Eigen::VectorXd solved = matrix.ldlt().solve(right.head(kNodes - 1));
     if (!solved.allFinite()) return start;
-    std::vector<double> next{0};
-    for (int k = 0; k < inner; ++k) next.push_back(std::clamp(solved[k], 0.0, 1.0));
-    next.push_back(1);
-    nodes = rising(next);
-    const double first = nodes.front();
-    const double range = nodes.back() - first;
-    for (double& node : nodes) node = (node - first) / range;
+    std::vector<double> logs(solved.data(), solved.data() + solved.size());
+    logs.push_back(0);
+    logs = rising(logs);
+    const double last = logs.back();
+    for (double& log : logs) log -= last;
+    curve = LogCurve(logs);
   }
-  return nodes;
+  return curve;
 }
 
 /// Root mean square disagreement of light in two exposures, in parts of full scale of the longer.
@@ -313,13 +329,19 @@ Result<RecoveredResponse> recover_response(std::span<const Picture> bracket,
   std::array<std::vector<double>, 3> coarse;
   std::array<std::vector<double>, 3> fine;
   for (std::size_t channel = 0; channel < 3; ++channel) {
-    coarse[channel] = start_curve(entries, static_cast<int>(channel));
-    fine[channel] = refine(pairs[channel], coarse[channel]);
+    const LogCurve start = start_curve(entries, static_cast<int>(channel));
+    coarse[channel] = start.table();
+    fine[channel] = refine(pairs[channel], start).table();
   }
   RecoveredResponse recovered;
   recovered.residual_if_linear = disagreement(pairs, ResponseCurve());
   VENEER_ASSIGN(recovered.curve, ResponseCurve::tabulated(fine));
   recovered.residual = disagreement(pairs, recovered.curve);
+  VENEER_ASSIGN(const ResponseCurve opencv, ResponseCurve::tabulated(coarse));
+  if (const double residual = disagreement(pairs, opencv); residual < recovered.residual) {
+    recovered.curve = opencv;
+    recovered.residual = residual;
+  }
   return recovered;
 }
 
