@@ -21,8 +21,9 @@ struct NoiseModel {
   [[nodiscard]] double variance(double counts) const;
 };
 /// By photon transfer (Janesick 2007): variance of differences against means, robustly over all
-/// pixels, from pictures that repeat the same exposure. Errors: kInvalidOption (no pair of equal
-/// exposure), kBadFormat (too small a range of light).
+/// pixels, from pictures that repeat the same exposure; counts are taken from the dark pictures
+/// among them, where there are any. Errors: kInvalidOption (no pair of equal exposure), kBadFormat
+/// (too small a range of light).
 [[nodiscard]] Result<NoiseModel> measure_noise(std::span<const Picture> pictures);
 
 /// Light in parts of what saturates the camera in one second, dark taken off.
@@ -37,7 +38,8 @@ struct MergedPicture {
 };
 
 /// Merges a bracket, each exposure weighted by the inverse of its variance, which is taken from the
-/// merged light and not from the single noisy count, so that the mean has no bias.
+/// merged light and not from the single noisy count, so that the mean has no bias (with a curved
+/// response: none of the first order of noise).
 /// @param lit   one or more exposures.   @param dark  of each, the same exposure without light.
 /// Errors: kInvalidOption (no pictures; a dark one missing; sizes or exposures that differ).
 [[nodiscard]] Result<MergedPicture> merge(std::span<const Picture> lit,

@@ -25,10 +25,15 @@ constexpr double kAcrossPx = 1;        // half the way across the outline
 constexpr double kMostContrast = 0.5;  // of logarithms: one strong edge is not an outline
 /// A ball's outline stands out by so much over what chance makes elsewhere.
 constexpr double kLeastStandingOut = 1.4;
+constexpr double kLeastOutline = 0.15;  // a steel ball on the board has 0.35 and more
 constexpr double kLeastRadiusPx = 8;
-constexpr double kEdgeWindowPx = 2.5;  // to both sides of the outline, in which its edge is sought
+constexpr int kRimReach = 6;  // half pixels around the outline that was found
 constexpr double kSettledPx = 0.01;
 constexpr double kReadingErrorPx = 0.5;
+/// Below this likeness the rim does not mirror the board, and the outline alone is to be had, with
+/// this error.
+constexpr double kLeastLikeness = 0.2;
+constexpr double kOutlineErrorPx = 1.5;
 
 /// Where a ball of which the place on the board is known shows in the picture.
 class BallView {
@@ -70,6 +75,20 @@ class BallView {
     const Eigen::Vector3d normal = ((nearest - std::sqrt(root2)) * *ray - middle) / radius_;
     const Eigen::Vector3d mirrored = *ray - 2 * ray->dot(normal) * normal;
     return plane_.camera_from_board.rotation.conjugate() * mirrored;
+  }
+  /// Where in the picture that place of the board is which is mirrored at a pixel of the ball.
+  [[nodiscard]] std::optional<Eigen::Vector2d> mirrored_px(const Eigen::Vector2d& place_m,
+                                                           const Eigen::Vector2d& pixel) const {
+    const auto ray = ray_through(plane_.lens, pixel);
+    const auto direction = light_at(place_m, pixel);
+    if (!ray || !direction || !(direction->z() > 0)) return std::nullopt;
+    const Eigen::Vector3d middle = centre(place_m);
+    const double nearest = ray->dot(middle);
+    const double root2 = nearest * nearest - middle.squaredNorm() + radius_ * radius_;
+    const Eigen::Vector3d point =
+        plane_.camera_from_board.inverse() * ((nearest - std::sqrt(root2)) * *ray);
+    const Eigen::Vector3d hit = point - point.z() / direction->z() * *direction;
+    return project(plane_.lens, plane_.camera_from_board * hit);
   }
   /// The place on the board at which a ball's centre shows in this pixel.
   [[nodiscard]] std::optional<Eigen::Vector2d> place_under(const Eigen::Vector2d& pixel) const {
@@ -122,44 +141,6 @@ double outline_strength(const cv::Mat& logarithm,
   return sum / kOutlinePoints;
 }
 
-/// How far outwards along its normal the light's strongest change lies from a point of the outline,
-/// pixels, and how strong it is: centroid of the squared change.
-struct Edge {
-  Eigen::Vector2d normal{0, 0};
-  double off = 0;
-  double strength = 0;
-};
-std::optional<Edge> edge_at(const cv::Mat& logarithm,
-                            const BallView& ball,
-                            const Eigen::Vector2d& place_m,
-                            double turn,
-                            double radius_px,
-                            double growth) {
-  const auto pixel = ball.outline_px(place_m, turn, growth);
-  const auto outside = ball.outline_px(place_m, turn, growth + 1 / radius_px);
-  if (!pixel || !outside) return std::nullopt;
-  Edge edge;
-  edge.normal = (*outside - *pixel).normalized();
-  constexpr double kStep = 0.25;
-  double sum = 0;
-  for (double along = -kEdgeWindowPx; along <= kEdgeWindowPx; along += kStep) {
-    const Eigen::Vector2d in = *pixel + (along - kStep) * edge.normal;
-    const Eigen::Vector2d out = *pixel + (along + kStep) * edge.normal;
-    for (const Eigen::Vector2d& end : {in, out})
-      if (!(end.x() >= 1 && end.y() >= 1 && end.x() < logarithm.cols - 1 &&
-            end.y() < logarithm.rows - 1))
-        return std::nullopt;
-    const double change = read(logarithm, out) - read(logarithm, in);
-    const double weight = change * change * (1 - std::abs(along) / (kEdgeWindowPx + kStep));
-    sum += weight;
-    edge.off += weight * along;
-  }
-  if (!(sum > 0)) return std::nullopt;
-  edge.off /= sum;
-  edge.strength = sum;
-  return edge;
-}
-
 /// That of the outline less that of rings inside, where a ball mirrors the room and not the marks.
 double ball_likeness(const cv::Mat& logarithm,
                      const BallView& ball,
@@ -173,39 +154,35 @@ double ball_likeness(const cv::Mat& logarithm,
   return outline - inside;
 }
 
-/// Moves a place and how much larger the outline is than it should be, until the edges around are
-/// met. What lies just inside the outline draws all edges inwards, which the size takes up.
-Eigen::Vector2d fit_outline(const cv::Mat& logarithm,
-                            const BallView& ball,
-                            Eigen::Vector2d place_m,
-                            double radius_px,
-                            double pixel_m) {
-  double growth = 1;
-  for (int round = 0; round < 15; ++round) {
-    const auto middle = ball.centre_px(place_m);
-    const auto beside_x = ball.centre_px(place_m + Eigen::Vector2d(pixel_m, 0));
-    const auto beside_y = ball.centre_px(place_m + Eigen::Vector2d(0, pixel_m));
-    if (!middle || !beside_x || !beside_y) return place_m;
-    Eigen::Matrix2d px_from_place;
-    px_from_place << (*beside_x - *middle) / pixel_m, (*beside_y - *middle) / pixel_m;
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
+/// A ball mirrors the board around it in its rim: correlation of the rim's light with that of the
+/// places which are mirrored there, as the same picture shows them. The board is matt, so that it
+/// looks to the ball as to the camera.
+double mirror_likeness(const cv::Mat& logarithm,
+                       const BallView& ball,
+                       const Eigen::Vector2d& place_m) {
+  double n = 0, a = 0, b = 0, aa = 0, ab = 0, bb = 0;
+  for (double growth = 0.76; growth < 0.97; growth += 0.02) {
     for (int i = 0; i < 2 * kOutlinePoints; ++i) {
-      const auto edge = edge_at(
-          logarithm, ball, place_m, std::numbers::pi * i / kOutlinePoints, radius_px, growth);
-      if (!edge) continue;
-      const double weight = std::min(edge->strength, 0.5) / (1 + edge->off * edge->off);
-      const Eigen::Vector3d row(edge->normal.x(), edge->normal.y(), 1);
-      normal += weight * row * row.transpose();
-      right += weight * edge->off * row;
+      const auto rim = ball.outline_px(place_m, std::numbers::pi * i / kOutlinePoints, growth);
+      const auto board = rim ? ball.mirrored_px(place_m, *rim) : std::nullopt;
+      if (!board) continue;
+      bool inside = true;
+      for (const Eigen::Vector2d& pixel : {*rim, *board})
+        inside = inside && pixel.x() >= 1 && pixel.y() >= 1 && pixel.x() < logarithm.cols - 1 &&
+                 pixel.y() < logarithm.rows - 1;
+      if (!inside) continue;
+      const double own = read(logarithm, *rim);
+      const double wanted = read(logarithm, *board);
+      n += 1;
+      a += own;
+      b += wanted;
+      aa += own * own;
+      ab += own * wanted;
+      bb += wanted * wanted;
     }
-    const Eigen::Vector3d step = normal.ldlt().solve(right);
-    if (!step.allFinite() || step.norm() > kEdgeWindowPx) return place_m;
-    place_m += px_from_place.inverse() * step.head<2>();
-    growth += step.z() / radius_px;
-    if (step.norm() < kSettledPx) break;
   }
-  return place_m;
+  const double spread = (n * aa - a * a) * (n * bb - b * b);
+  return n >= kOutlinePoints && spread > 0 ? (n * ab - a * b) / std::sqrt(spread) : 0;
 }
 
 /// Mean of the channels; a saturated pixel is brighter than all that are not.
@@ -297,7 +274,7 @@ Result<BallReading> search(const MergedPicture& picture, const PlaneView& plane,
       }
     }
   }
-  if (!(strongest > kLeastStandingOut * quantile(strengths, 0.5))) {
+  if (!(strongest > std::max(kLeastOutline, kLeastStandingOut * quantile(strengths, 0.5)))) {
     return fail(Errc::kNotFound,
                 "reading the mirror ball: there is a bright spot at {:.0f}, {:.0f} but no outline "
                 "of a ball of {} mm around it; check that the ball lies on the board, whole in the "
@@ -306,21 +283,34 @@ Result<BallReading> search(const MergedPicture& picture, const PlaneView& plane,
                 highlight->y(),
                 radius_m / kMillimetre);
   }
-  strongest = outline_strength(smooth, ball, best, radius_px);
-  for (double step = 0.5 * pixel_m; step > kSettledPx * pixel_m;) {
+  // The outline is found to a pixel or two; what the rim mirrors places it far better.
+  const Eigen::Vector2d found = best;
+  double likeness = 0;
+  for (int y = -kRimReach; y <= kRimReach; ++y) {
+    for (int x = -kRimReach; x <= kRimReach; ++x) {
+      const Eigen::Vector2d place = found + 0.5 * pixel_m * Eigen::Vector2d(x, y);
+      const double own = mirror_likeness(smooth, ball, place);
+      if (own <= likeness) continue;
+      likeness = own;
+      best = place;
+    }
+  }
+  for (double step = 0.25 * pixel_m; step > kSettledPx * pixel_m;) {
     bool moved = false;
     for (const auto& [x, y] : {std::array{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
       const Eigen::Vector2d place = best + step * Eigen::Vector2d(x, y);
-      const double strength = outline_strength(smooth, ball, place, radius_px);
-      if (!(strength > strongest)) continue;
-      strongest = strength;
+      const double own = mirror_likeness(smooth, ball, place);
+      if (!(own > likeness)) continue;
+      likeness = own;
       best = place;
       moved = true;
     }
     if (!moved) step /= 2;
   }
 
-  best = fit_outline(logarithm, ball, best, radius_px, pixel_m);
+  if (likeness < kLeastLikeness) best = found;
+  const double error_px = likeness < kLeastLikeness ? kOutlineErrorPx : kReadingErrorPx;
+
   const auto light = ball.light_at(best, *highlight);
   const auto centre = ball.centre_px(best);
   if (!light || !centre) {
@@ -337,7 +327,7 @@ Result<BallReading> search(const MergedPicture& picture, const PlaneView& plane,
   reading.highlight_px = *highlight;
   double squares = 0;
   for (const auto& [x, y] : {std::array{1.0, 0.0}, {0.0, 1.0}}) {
-    const Eigen::Vector2d off = kReadingErrorPx * Eigen::Vector2d(x, y);
+    const Eigen::Vector2d off = error_px * Eigen::Vector2d(x, y);
     for (const auto& moved :
          {ball.light_at(best + pixel_m * off, *highlight), ball.light_at(best, *highlight + off)}) {
       const double angle = moved ? std::atan2(moved->cross(*light).norm(), moved->dot(*light))

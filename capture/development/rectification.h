@@ -44,17 +44,20 @@ struct PlaneView {
 [[nodiscard]] Result<CameraLens> calibrate_lens(const std::vector<FoundMarks>& views,
                                                 int width,
                                                 int height);
-/// Errors: kBadFormat (residual above 2 px: a wrong board or lens; the text says which values it
-/// has).
+/// A few corners (a fifth at most) that are off by far more than the rest are left out.
+/// Errors: kInvalidOption (a lens without finite values), kBadFormat (fewer than 6 corners,
+/// residual above 2 px: a wrong board or lens; the text says which values it has).
 [[nodiscard]] Result<PlaneView> locate_plane(const FoundMarks& marks,
                                              const CameraLens& lens,
                                              const SampleArea& area);
 
 /// Light of the sample's texels.
 struct RectifiedPicture {
-  Image<Rgb32f> light;     ///< [rows x columns of SampleArea]
-  Image<Rgb32f> variance;  ///< of it
-  /// 1 where a pixel that the texel covers was saturated or lies off the picture.
+  Image<Rgb32f> light;  ///< [rows x columns of SampleArea]
+  /// Of it; that neighbouring texels share pixels is not said.
+  Image<Rgb32f> variance;
+  /// 1, its light 0 and its variance infinite, where a pixel that the texel covers was saturated or
+  /// lies off the picture.
   Image<std::uint8_t> masked;
   double pixels_per_texel =
       0;  ///< along a side, in the middle; below 1 texels are finer than pixels

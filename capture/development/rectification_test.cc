@@ -281,8 +281,7 @@ TEST(Rectification, GivesFlatFieldsBackExactly) {
 }
 
 TEST(Rectification, BringsATextureToItsPlace) {
-  for (const auto& [theta, texels] :
-       {std::pair{0.0, 64}, {30.0, 64}, {60.0, 64}, {30.0, 16}, {30.0, 256}}) {
+  for (const auto& [theta, texels] : {std::pair{0.0, 64}, {60.0, 64}, {30.0, 16}, {30.0, 200}}) {
     BoardScene scene = covered_scene(theta * kDegree, 1.0);
     scene.lens.k1 = 0.3;
     const MergedPicture picture = render(scene);

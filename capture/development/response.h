@@ -45,9 +45,10 @@ struct RecoveredResponse {
   double residual = 0;
   double residual_if_linear = 0;
 };
-/// From a bracket of an unmoving scene: at least three exposures whose ratios are known.
-/// Errors: kInvalidOption (too few exposures, sizes that differ), kBadFormat (too little of the
-/// range is covered).
+/// From a bracket of an unmoving scene: at least three exposures whose ratios are known; dark
+/// pictures among them (Shot::dark) are taken off. OpenCV's 8-bit curve is the start of a fit to
+/// the counts of full depth, and is kept where that fits better. Errors: kInvalidOption (too few
+/// exposures, sizes that differ), kBadFormat (too little of the range is covered).
 [[nodiscard]] Result<RecoveredResponse> recover_response(std::span<const Picture> bracket,
                                                          ResponseMethod method);
 

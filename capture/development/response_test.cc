@@ -94,11 +94,6 @@ TEST(RecoveredResponse, IsTheOneThatTheBracketWentThrough) {
     for (const ResponseMethod method : {ResponseMethod::kDebevec, ResponseMethod::kRobertson}) {
       const auto recovered = recover_response(bracket_through(encode), method);
       ASSERT_TRUE(recovered) << recovered.error().what;
-      fmt::print("{}: worst {:.4f}, residual {:.5f}, if linear {:.5f}\n",
-                 name,
-                 worst_light(recovered->curve, encode),
-                 recovered->residual,
-                 recovered->residual_if_linear);
       EXPECT_LT(worst_light(recovered->curve, encode),
                 std::string(name) == "s-shaped" ? 0.05 : 0.01)
           << name;
