@@ -24,6 +24,8 @@ constexpr auto kPollUs = std::uint64_t{50'000};  // how soon a lost camera is no
 }  // namespace
 
 struct AravisCamera::State {
+  // Set by the thread of the heartbeat, too, which ends with the camera: so it lives longer.
+  std::atomic<bool> lost{false};
   GObjectPtr<ArvCamera> camera;
   GObjectPtr<ArvStream> stream;  // made anew for each pixel format
   AravisOptions options;
@@ -35,7 +37,6 @@ struct AravisCamera::State {
   Trigger trigger = Trigger::kFree;
   bool single_frame = false;
   std::uint64_t last_id = 0, sequence = 0;
-  std::atomic<bool> lost{false};  // set by the thread of the heartbeat, too
   gulong lost_handler = 0;
 
   ~State() {
@@ -502,21 +503,27 @@ Status AravisCamera::set_trigger(Trigger trigger) {
     s.trigger = trigger;
     return {};
   }
+  const auto fits = [&](std::string_view source) {
+    return trigger == Trigger::kSoftware ? source == "Software" : source.starts_with("Line");
+  };
+  std::string source;
+  // The line that the camera is set to is more likely the wired one than the first.
+  const char* present = arv_camera_get_trigger_source(s.camera.get(), error.out());
+  if (present != nullptr && !error && fits(present)) source = present;
   guint count = 0;
   const GMemory<const char*> names(
       arv_camera_dup_available_trigger_sources(s.camera.get(), &count, error.out()));
-  const std::span sources(names.get(), error || names == nullptr ? 0 : count);
-  const auto source = std::ranges::find_if(sources, [&](std::string_view each) {
-    return trigger == Trigger::kSoftware ? each == "Software" : each.starts_with("Line");
-  });
-  if (source == sources.end()) {
+  for (const char* each : std::span(names.get(), error || names == nullptr ? 0 : count)) {
+    if (source.empty() && fits(each)) source = each;
+  }
+  if (source.empty()) {
     return fail(Errc::kUnavailable,
                 "{}: it has no {} trigger; set trigger to \"free\" or leave it out",
                 s.description,
                 trigger == Trigger::kSoftware ? "software" : "hardware");
   }
-  arv_camera_set_trigger(s.camera.get(), *source, error.out());
-  if (error) return s.failed(fmt::format("setting the trigger to {}", *source), error);
+  arv_camera_set_trigger(s.camera.get(), source.c_str(), error.out());
+  if (error) return s.failed(fmt::format("setting the trigger to {}", source), error);
   s.trigger = trigger;
   return {};
 }

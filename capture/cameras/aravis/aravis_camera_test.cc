@@ -317,6 +317,15 @@ TEST_F(AravisCameraTest, ACameraThatIsNotThereIsNotFoundAndTheOthersAreNamed) {
   EXPECT_EQ(both.error().code, Errc::kInvalidOption);
 }
 
+TEST_F(AravisCameraTest, AnAddressAtWhichNothingAnswersIsNotFound) {
+  for (const std::string address : {"127.0.0.77", "no address"}) {
+    const auto camera = open_once(fmt::format("address = \"{}\"", address));
+    ASSERT_FALSE(camera);
+    EXPECT_EQ(camera.error().code, Errc::kNotFound) << camera.error().what;
+    EXPECT_THAT(camera.error().what, HasSubstr(address));
+  }
+}
+
 TEST_F(AravisCameraTest, LostPacketsAreDamagedPicturesAndGoodOnesComeAfterThem) {
   // Of some 190 packets a picture, so that about half of the pictures are damaged.
   FakeCamera fake(serial_, 4);
