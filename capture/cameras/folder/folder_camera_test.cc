@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
+#include <tiffio.h>
 
 #include <cmath>
 #include <limits>
@@ -163,6 +164,9 @@ TEST_F(FolderCameraTest, TiffAndPngGiveTheSameCounts) {
   ASSERT_TRUE(cv::imwrite(at("1.tiff").string(), picture));
   ASSERT_TRUE(write_png(at("2.png"), same.view()));
   ASSERT_TRUE(cv::imwrite(at("3.TIF").string(), cv::Mat(3, 2, CV_8UC1, cv::Scalar(77))));
+  const cv::Mat floats(3, 2, CV_32FC3, cv::Scalar(2.0, -1.0, 0.2));
+  ASSERT_TRUE(cv::imwrite(at("4.tif").string(), floats, {cv::IMWRITE_TIFF_COMPRESSION, 1}));
+  ASSERT_TRUE(cv::imwrite(at("5.tif").string(), floats));  // OpenCV packs them as LogLuv
   const auto camera = open("exposure_s = 1.0");
   ASSERT_TRUE(camera) << camera.error().what;
   const auto tiff = (*camera)->grab();
@@ -173,6 +177,54 @@ TEST_F(FolderCameraTest, TiffAndPngGiveTheSameCounts) {
   EXPECT_EQ(tiff->full_scale, png->full_scale);
   EXPECT_EQ(grey->counts(1, 2), (Rgb16{77, 77, 77}));
   EXPECT_EQ(grey->full_scale, 255);
+  const auto scaled = (*camera)->grab();
+  ASSERT_TRUE(scaled) << scaled.error().what;
+  EXPECT_EQ(scaled->counts(1, 2), (Rgb16{13107, 0, 65535}));
+  const auto log_luv = (*camera)->grab();
+  ASSERT_FALSE(log_luv);
+  EXPECT_THAT(log_luv.error().what, HasSubstr("convert it"));
+}
+
+/// A grey TIFF as RAW converters write it, whose EXIF says how long it was exposed.
+void write_tiff_with_exposure(const std::filesystem::path& path, double exposure_s) {
+  TIFF* file = TIFFOpen(path.c_str(), "w");
+  ASSERT_NE(file, nullptr);
+  const auto describe = [&] {
+    TIFFSetField(file, TIFFTAG_IMAGEWIDTH, 2);
+    TIFFSetField(file, TIFFTAG_IMAGELENGTH, 1);
+    TIFFSetField(file, TIFFTAG_BITSPERSAMPLE, 16);
+    TIFFSetField(file, TIFFTAG_SAMPLESPERPIXEL, 1);
+    TIFFSetField(file, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+    TIFFSetField(file, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
+  };
+  describe();
+  std::array<std::uint16_t, 2> row{123, 456};
+  TIFFWriteScanline(file, row.data(), 0, 0);
+  TIFFWriteDirectory(file);
+  TIFFCreateEXIFDirectory(file);
+  TIFFSetField(file, EXIFTAG_EXPOSURETIME, exposure_s);
+  std::uint64_t exif = 0;
+  TIFFWriteCustomDirectory(file, &exif);
+  TIFFSetDirectory(file, 0);
+  TIFFSetField(file, TIFFTAG_EXIFIFD, exif);
+  TIFFRewriteDirectory(file);
+  TIFFClose(file);
+}
+
+TEST_F(FolderCameraTest, ATiffSaysItselfHowLongItWasExposed) {
+  write_tiff_with_exposure(at("1.tiff"), 0.25);
+  write_tiff_with_exposure(at("2.tiff"), 0.5);
+  const auto camera = open();
+  ASSERT_TRUE(camera) << camera.error().what;
+  EXPECT_NEAR((*camera)->exposure_range().least_s, 0.25, 1e-6);
+  EXPECT_NEAR((*camera)->exposure_range().most_s, 0.5, 1e-6);
+  EXPECT_EQ((*camera)->grab()->counts(1, 0), (Rgb16{456, 456, 456}));
+  // What is written beside them counts more, and a picture that says nothing needs it.
+  ASSERT_TRUE(write_text(at("exposures.csv"), "1.tiff,3\n2.tiff,4\n"));
+  EXPECT_EQ(open().value()->exposure_range().most_s, 4);
+  std::filesystem::remove(at("exposures.csv"));
+  ASSERT_TRUE(cv::imwrite(at("3.tiff").string(), cv::Mat(1, 2, CV_16UC1, cv::Scalar(7))));
+  EXPECT_THAT(error(), HasSubstr("3.tiff does not say"));
 }
 
 TEST_F(FolderCameraTest, ADamagedPictureIsAnErrorThatNamesIt) {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "capture/cameras/folder/picture_file.h"
 
-#include <opencv2/imgcodecs.hpp>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,6 +11,7 @@
 #include <vector>
 
 #include "base/image_files.h"
+#include "capture/cameras/folder/tiff_file.h"
 
 namespace veneer::capture {
 namespace {
@@ -114,56 +113,23 @@ Result<PictureCounts> read_exr_counts(const std::filesystem::path& path, std::ui
   return result;
 }
 
-template <class Sample, class Convert>
-Status copy_samples(const cv::Mat& from, Image<Rgb16>& to, Convert convert) {
-  const int channels = from.channels();
-  for (int y = 0; y < to.height(); ++y) {
-    const auto* row = from.ptr<Sample>(y);
-    for (int x = 0; x < to.width(); ++x) {
-      for (int c = 0; c < 3; ++c) {
-        // OpenCV's colours run blue, green, red.
-        const Sample sample = row[x * channels + (channels < 3 ? 0 : 2 - c)];
-        VENEER_ASSIGN(to(x, y)[static_cast<std::size_t>(c)], convert(sample));
+Result<PictureCounts> read_tiff_counts(const std::filesystem::path& path,
+                                       std::uint16_t full_scale) {
+  VENEER_ASSIGN(const TiffSamples samples, read_tiff(path));
+  PictureCounts result{Image<Rgb16>(samples.width, samples.height), full_scale};
+  if (full_scale == 0) result.full_scale = samples.bits == 8 ? 255 : 65535;
+  const auto channels = static_cast<std::size_t>(samples.channels);
+  for (std::size_t i = 0; i < result.counts.pixels().size(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::size_t at = i * channels + std::min(c, channels - 1);
+      std::uint16_t& count = result.counts.pixels()[i][c];
+      if (samples.values.empty()) {
+        count = samples.counts[at];
+      } else {
+        VENEER_ASSIGN(count, count_of(samples.values[at], result.full_scale, path));
       }
     }
   }
-  return {};
-}
-
-Result<PictureCounts> read_tiff_counts(const std::filesystem::path& path,
-                                       std::uint16_t full_scale) {
-  cv::Mat picture;
-  try {
-    picture = cv::imread(path.string(), cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception& error) {
-    return fail(Errc::kBadFormat, "reading {}: {}", path.string(), error.what());
-  }
-  if (picture.empty()) {
-    return fail(Errc::kBadFormat,
-                "reading {}: it is no TIFF that can be read, or damaged; convert it again",
-                path.string());
-  }
-  const int depth = picture.depth();
-  const int widest = depth == CV_8U ? 255 : 65535;
-  PictureCounts result{Image<Rgb16>(picture.cols, picture.rows),
-                       full_scale == 0 ? static_cast<std::uint16_t>(widest) : full_scale};
-  const auto as_it_is = [](auto sample) -> Result<std::uint16_t> { return sample; };
-  Status copied;
-  if (depth == CV_8U) {
-    copied = copy_samples<std::uint8_t>(picture, result.counts, as_it_is);
-  } else if (depth == CV_16U) {
-    copied = copy_samples<std::uint16_t>(picture, result.counts, as_it_is);
-  } else if (depth == CV_32F) {
-    copied = copy_samples<float>(picture, result.counts, [&](float sample) {
-      return count_of(sample, result.full_scale, path);
-    });
-  } else {
-    copied = fail(Errc::kBadFormat,
-                  "reading {}: its samples are neither 8 nor 16 bits nor 32-bit floats; convert it "
-                  "to 16 bits",
-                  path.string());
-  }
-  VENEER_TRY(copied);
   return result;
 }
 
@@ -174,6 +140,12 @@ PictureKind kind_of(const std::filesystem::path& path) {
   const auto found =
       std::ranges::find(kEndings, ending, &std::pair<std::string_view, PictureKind>::first);
   return found == kEndings.end() ? PictureKind::kNone : found->second;
+}
+
+std::optional<double> exposure_of(const std::filesystem::path& path) {
+  const std::string ending = ending_of(path);
+  if (ending != ".tif" && ending != ".tiff") return std::nullopt;
+  return tiff_exposure(path);
 }
 
 Result<PictureCounts> read_picture(const std::filesystem::path& path, std::uint16_t full_scale) {

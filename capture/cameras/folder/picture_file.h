@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 
 #include "base/image.h"
 #include "base/result.h"
@@ -17,6 +18,9 @@ enum class PictureKind : std::uint8_t {
   kRaw,      ///< a camera's RAW, to be converted first
 };
 [[nodiscard]] PictureKind kind_of(const std::filesystem::path& path);
+
+/// Seconds, where the file itself says so: the EXIF of a TIFF.
+[[nodiscard]] std::optional<double> exposure_of(const std::filesystem::path& path);
 
 struct PictureCounts {
   Image<Rgb16> counts;  ///< a grey file repeats its value

@@ -166,15 +166,8 @@ Result<std::vector<SeriesPicture>> find_series(const std::filesystem::path& fold
   std::map<std::string, double> exposures;
   if (listed) {
     VENEER_ASSIGN(exposures, read_exposures(list));
-  } else if (!exposure_s) {
-    return fail(Errc::kInvalidOption,
-                "opening the camera: how long the pictures in {} were exposed is not known; set "
-                "exposure_s if all are alike, or put {} beside them: a line \"file,exposure_s\", "
-                "then for each picture \"{},1/60\"",
-                folder.string(),
-                kExposuresName,
-                paths.front().filename().string());
-  } else if (!std::isfinite(*exposure_s) || *exposure_s <= 0) {
+  }
+  if (exposure_s && (!std::isfinite(*exposure_s) || *exposure_s <= 0)) {
     return fail(Errc::kInvalidOption,
                 "opening the camera: exposure_s is {}; it must be above 0",
                 *exposure_s);
@@ -182,8 +175,21 @@ Result<std::vector<SeriesPicture>> find_series(const std::filesystem::path& fold
 
   std::vector<SeriesPicture> series;
   for (std::filesystem::path& path : paths) {
-    double seconds = exposure_s.value_or(0);
-    if (listed) {
+    double seconds = 0;
+    if (!listed) {
+      const std::optional<double> said = exposure_of(path);
+      if (!said && !exposure_s) {
+        return fail(
+            Errc::kInvalidOption,
+            "opening the camera: {} does not say how long it was exposed; set exposure_s if "
+            "all are alike, or put {} beside them: a line \"file,exposure_s\", then for each "
+            "picture \"{},1/60\"",
+            path.string(),
+            kExposuresName,
+            path.filename().string());
+      }
+      seconds = said ? *said : *exposure_s;
+    } else {
       const auto entry = exposures.find(path.filename().string());
       if (entry == exposures.end()) {
         return fail(Errc::kBadFormat,
