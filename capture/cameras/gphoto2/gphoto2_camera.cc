@@ -114,6 +114,7 @@ Result<Opened> prepare(GphotoLink& link, const Settings& settings) {
   if (settings.iso) {
     VENEER_TRY(set_named(link, {"iso"}, std::to_string(*settings.iso)));
   } else if (auto iso = link.choice({"iso"}); iso && !shutter_seconds(iso->now)) {
+    // Whatever is no plain number is an automatic.
     return fail(Errc::kInvalidOption,
                 "the camera chooses its sensitivity itself (ISO \"{}\"), so that pictures cannot "
                 "be compared: set the key iso, 100 for example",
@@ -334,6 +335,7 @@ Result<std::unique_ptr<Camera>> open_gphoto2(TomlReader& config) {
 Result<std::vector<CameraInfo>> list_gphoto2() {
   VENEER_ASSIGN(const std::vector<GphotoAddress> found, find_gphoto_cameras());
   std::vector<CameraInfo> cameras;
+  cameras.reserve(found.size());
   for (const auto& [model, port] : found) {
     cameras.push_back({"gphoto2", model, port, obstacle(port)});
   }

@@ -349,6 +349,8 @@ Result<std::vector<CameraFilePath>> GphotoLink::release(const std::string& doing
         camera_.get(), static_cast<int>(left.count()), &type, &data, context_.get());
     const std::unique_ptr<void, decltype(&std::free)> owned(data, &std::free);
     if (code < GP_OK) return failed(doing, code);
+    // Over a network it does not wait at all.
+    if (type == GP_EVENT_TIMEOUT) std::this_thread::sleep_for(std::chrono::milliseconds(10));
     const bool added = type == GP_EVENT_FILE_ADDED && data != nullptr;
     if (added && is_picture(static_cast<const CameraFilePath*>(data)->name)) {
       files.push_back(*static_cast<const CameraFilePath*>(data));
