@@ -53,6 +53,23 @@ class V4l2Camera final : public Camera {
     return {};
   }
 
+  [[nodiscard]] std::vector<std::string> pixel_formats() const override {
+    std::vector<std::string> names = node_.formats();
+    std::stable_partition(names.begin(), names.end(), [this](const std::string& name) {
+      return name == picture_.format;
+    });
+    return names;
+  }
+  [[nodiscard]] Status set_pixel_format(std::string_view name) override {
+    const Settings before = settings_;
+    settings_.format = name;
+    Status set = begin();
+    if (set) return set;
+    settings_ = before;
+    VENEER_TRY(begin());  // as it was; unless it is gone, which is the error then
+    return set;
+  }
+
   [[nodiscard]] Result<CameraFrame> grab() override {
     const Time begin = SteadyClock().now();
     const std::string doing = fmt::format("taking a picture with {}", settings_.device.string());
@@ -78,6 +95,7 @@ class V4l2Camera final : public Camera {
     return fail(Errc::kTimeout, "{}: none came that began after the call; try again", doing);
   }
 
+  /// Streams as the settings say, from the start.
   [[nodiscard]] Status begin() {
     const std::string doing = fmt::format("opening camera {}", settings_.device.string());
     const std::vector<std::string> formats = node_.formats();
@@ -92,6 +110,7 @@ class V4l2Camera final : public Camera {
                     fmt::join(formats, ", "));
       }
     }
+    stream_.release();
     VENEER_TRY(node_.check_free());
     VENEER_ASSIGN(const V4l2Node::Picture before, node_.picture());
     const std::string format = settings_.format.empty() ? before.format : settings_.format;

@@ -143,6 +143,25 @@ TEST(V4l2Lab, SaysWhatTheCameraHasWhereItLacksWhatIsAskedFor) {
   EXPECT_EQ(exposure.error().code, Errc::kUnavailable);
 }
 
+TEST(V4l2Lab, ChangesItsFormatAndKeepsItWhereAnotherIsRefused) {
+  const auto camera = open("format = \"YUYV\"\nwidth = 640\nheight = 360");
+  ASSERT_TRUE(camera) << camera.error().what;
+  EXPECT_EQ((*camera)->pixel_formats().front(), "YUYV");
+  EXPECT_GT((*camera)->pixel_formats().size(), 3u);
+  ASSERT_TRUE((*camera)->set_pixel_format("Y16"));
+  EXPECT_EQ((*camera)->pixel_formats().front(), "Y16");
+  const auto frame = (*camera)->grab();
+  ASSERT_TRUE(frame) << frame.error().what;
+  EXPECT_EQ(frame->full_scale, 65535);
+  EXPECT_EQ(frame->counts.height(), 360);
+  const auto refused = (*camera)->set_pixel_format("ZZZZ");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, Errc::kInvalidOption);
+  const auto after = (*camera)->grab();
+  ASSERT_TRUE(after) << after.error().what;
+  EXPECT_EQ(after->full_scale, 65535);
+}
+
 TEST(V4l2Lab, NamesWhoHoldsTheCamera) {
   std::array<int, 2> ready{};
   ASSERT_EQ(::pipe(ready.data()), 0);
