@@ -18,11 +18,11 @@ namespace veneer::capture {
 namespace {
 
 constexpr double kMillimetre = 1e-3;
-constexpr double kLeastHighlight = 8;  // brighter than the median of the picture
-constexpr double kOfHighlight = 0.1;   // of its brightest: what belongs to it
-constexpr int kOutlinePoints = 180;    // at which the outline is looked at
-constexpr double kAcrossPx = 1;        // half the way across the outline
-constexpr double kMostContrast = 0.5;  // of logarithms: one strong edge is not an outline
+constexpr double kLeastHighlight = 20;  // brighter than the median of the picture
+constexpr double kOfHighlight = 0.1;    // of its brightest: what belongs to it
+constexpr int kOutlinePoints = 180;     // at which the outline is looked at
+constexpr double kAcrossPx = 1;         // half the way across the outline
+constexpr double kMostContrast = 0.5;   // of logarithms: one strong edge is not an outline
 /// A ball's outline stands out by so much over what chance makes elsewhere.
 constexpr double kLeastStandingOut = 1.4;
 constexpr double kLeastOutline = 0.15;  // a steel ball on the board has 0.35 and more
