@@ -16,6 +16,7 @@
 namespace veneer::capture {
 namespace {
 
+constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 constexpr double kUsualIndex = 1.5;         // of varnish, plastic, gelatine: for predictions
 constexpr double kMarksMovedWarning = 0.3;  // px: a third of one mixes neighbouring texels
 
@@ -32,6 +33,23 @@ int index_of_angle(std::span<const double> angles_rad, double wanted_rad) {
     if (std::abs(std::sin(angles_rad[i] - wanted_rad)) < kSame) return static_cast<int>(i);
   }
   return -1;
+}
+
+/// Root mean square difference of texels that lie side by side.
+double step_between(const Image<Rgb32f>& part, const Image<std::uint8_t>& masked) {
+  double squares = 0;
+  double steps = 0;
+  for (int y = 0; y < part.height(); ++y) {
+    for (int x = 0; x < part.width(); ++x) {
+      if (masked(x, y) != 0) continue;
+      for (const auto& [u, v] : {std::pair{x + 1, y}, std::pair{x, y + 1}}) {
+        if (u >= part.width() || v >= part.height() || masked(u, v) != 0) continue;
+        squares += (part(u, v) - part(x, y)).squaredNorm();
+        steps += 3;
+      }
+    }
+  }
+  return steps > 0 ? std::sqrt(squares / steps) : 0;
 }
 
 /// Median distance of the marks that both pictures show.
@@ -55,6 +73,7 @@ struct Developer::State {
   std::vector<double> angles_rad;      // of the pictures behind the analyser
   std::optional<StokesSolver> solver;  // where there are more than parallel and cross
   std::vector<PlaneView> white_planes;
+  std::vector<Rectifier> on_white, on_sample;  // of each view
 
   State(const Recording& captured, const DevelopmentOptions& wanted)
       : recording(captured), options(wanted) {}
@@ -73,7 +92,7 @@ struct Developer::State {
     return captured_light(recording, {target, view, light}, findings.response, findings.noise);
   }
   [[nodiscard]] Result<FoundMarks> marks_of(Target target, int view) const;
-  [[nodiscard]] Status note_white_range(int view, const PlaneView& plane);
+  [[nodiscard]] Status note_white_range(int view, const Rectifier& rectifier);
 
   /// Behind one angle of the analyser, in the unit of a sample and halved.
   struct Reading {
@@ -83,6 +102,7 @@ struct Developer::State {
     std::vector<Reading> readings;  // one an angle
     Image<std::uint8_t> masked;
     std::vector<double> saturated;  // of the pixels, one an angle
+    double pixels_per_texel = 0;
   };
   [[nodiscard]] Result<Texels> texels_of(Target target, int view, int light) const;
   [[nodiscard]] DevelopedDirection two_pictures(Texels texels) const;
@@ -162,10 +182,10 @@ Result<FoundMarks> Developer::State::marks_of(Target target, int view) const {
   return find_marks(pictures[static_cast<std::size_t>(std::max(0, cross))].light, plan().board);
 }
 
-Status Developer::State::note_white_range(int view, const PlaneView& plane) {
+Status Developer::State::note_white_range(int view, const Rectifier& rectifier) {
   VENEER_ASSIGN(const std::vector<MergedPicture> pictures,
                 light_of(Target::kWhite, view, nearest_to_normal(plan().lights)));
-  const RectifiedPicture white = rectify(pictures.front(), plane, plan().area);
+  const RectifiedPicture white = rectifier.rectify(pictures.front());
   std::vector<double> light;
   for (std::size_t i = 0; i < white.masked.pixels().size(); ++i) {
     if (white.masked.pixels()[i] == 0) light.push_back(white.light.pixels()[i].mean());
@@ -180,14 +200,14 @@ Status Developer::State::note_white_range(int view, const PlaneView& plane) {
 Status Developer::State::find_planes() {
   constexpr std::size_t kLeastViewsForLens = 3;
   const std::size_t views = plan().views.size();
-  std::vector<FoundMarks> on_white;
-  std::vector<FoundMarks> on_sample;
+  std::vector<FoundMarks> white_marks;
+  std::vector<FoundMarks> sample_marks;
   for (int view = 0; view < static_cast<int>(views); ++view) {
     VENEER_ASSIGN(FoundMarks white, marks_of(Target::kWhite, view));
     VENEER_ASSIGN(FoundMarks sample, marks_of(Target::kSample, view));
     findings.marks_moved_px = std::max(findings.marks_moved_px, moved_px(white, sample));
-    on_white.push_back(std::move(white));
-    on_sample.push_back(std::move(sample));
+    white_marks.push_back(std::move(white));
+    sample_marks.push_back(std::move(sample));
   }
   if (findings.marks_moved_px > kMarksMovedWarning)
     findings.warnings.push_back(fmt::format(
@@ -198,8 +218,9 @@ Status Developer::State::find_planes() {
     findings.lens = *plan().lens;
   } else if (views >= kLeastViewsForLens) {
     VENEER_ASSIGN(const std::vector<MergedPicture> any, light_of(Target::kSample, 0, 0));
-    VENEER_ASSIGN(findings.lens,
-                  calibrate_lens(on_sample, any.front().light.width(), any.front().light.height()));
+    VENEER_ASSIGN(
+        findings.lens,
+        calibrate_lens(sample_marks, any.front().light.width(), any.front().light.height()));
     findings.lens_was_calibrated = true;
   } else {
     return fail(Errc::kInvalidOption,
@@ -210,10 +231,17 @@ Status Developer::State::find_planes() {
                 kLeastViewsForLens);
   }
   for (std::size_t view = 0; view < views; ++view) {
-    VENEER_ASSIGN(const PlaneView white, locate_plane(on_white[view], findings.lens, plan().area));
+    VENEER_ASSIGN(const PlaneView white,
+                  locate_plane(white_marks[view], findings.lens, plan().area));
     VENEER_ASSIGN(const PlaneView sample,
-                  locate_plane(on_sample[view], findings.lens, plan().area));
-    VENEER_TRY(note_white_range(static_cast<int>(view), white));
+                  locate_plane(sample_marks[view], findings.lens, plan().area));
+    VENEER_ASSIGN(const std::vector<MergedPicture> any,
+                  light_of(Target::kSample, static_cast<int>(view), 0));
+    const int width = any.front().light.width();
+    const int height = any.front().light.height();
+    on_white.emplace_back(white, plan().area, width, height);
+    on_sample.emplace_back(sample, plan().area, width, height);
+    VENEER_TRY(note_white_range(static_cast<int>(view), on_white.back()));
     white_planes.push_back(white);
     findings.planes.push_back(sample);
     findings.views.push_back(sample.view_direction);
@@ -288,7 +316,7 @@ Result<Developer::State::Texels> Developer::State::texels_of(Target target,
   VENEER_ASSIGN(const std::vector<MergedPicture> pictures, light_of(target, view, light));
   VENEER_ASSIGN(const std::vector<MergedPicture> whites, light_of(Target::kWhite, view, light));
   const std::size_t v = static_cast<std::size_t>(view);
-  const PlaneView& plane = target == Target::kSample ? findings.planes[v] : white_planes[v];
+  const Rectifier& rectifier = target == Target::kSample ? on_sample[v] : on_white[v];
   const SampleArea& area = plan().area;
   // The white plate lies flat, so its sample is its reflectance times the cosine of the light.
   const double white_sample =
@@ -299,8 +327,8 @@ Result<Developer::State::Texels> Developer::State::texels_of(Target target,
   Texels texels;
   texels.masked = Image<std::uint8_t>(area.columns, area.rows);
   for (std::size_t angle = 0; angle < pictures.size(); ++angle) {
-    const RectifiedPicture picture = rectify(pictures[angle], plane, area);
-    const RectifiedPicture white = rectify(whites[angle], white_planes[v], area);
+    const RectifiedPicture picture = rectifier.rectify(pictures[angle]);
+    const RectifiedPicture white = on_white[v].rectify(whites[angle]);
     Reading reading{Image<Rgb32f>(area.columns, area.rows), Image<Rgb32f>(area.columns, area.rows)};
     for (std::size_t i = 0; i < texels.masked.pixels().size(); ++i) {
       const Eigen::Array3f w = white.light.pixels()[i].array();
@@ -318,6 +346,7 @@ Result<Developer::State::Texels> Developer::State::texels_of(Target target,
            w.square())
               .matrix();
     }
+    texels.pixels_per_texel = picture.pixels_per_texel;
     texels.saturated.push_back(pictures[angle].saturated_fraction);
     texels.readings.push_back(std::move(reading));
   }
@@ -418,6 +447,7 @@ Result<DevelopedDirection> Developer::develop(int view, int light) const {
   VENEER_CHECK(view >= 0 && view < static_cast<int>(rig.views.size()) && light >= 0 &&
                light < static_cast<int>(rig.lights.size()));
   VENEER_ASSIGN(State::Texels texels, state_->texels_of(Target::kSample, view, light));
+  const double pixels_per_texel = texels.pixels_per_texel;
   DevelopedDirection direction = state_->two_pictures(std::move(texels));
   direction.view = view;
   direction.light = light;
@@ -430,7 +460,6 @@ Result<DevelopedDirection> Developer::develop(int view, int light) const {
   const bool to_unpolarised = state_->options.index.has_value();
   const Contrasts contrasts =
       to_unpolarised ? with_turned_plane(rig.contrasts, findings.fresnel) : rig.contrasts;
-  const double gain = to_unpolarised ? findings.fresnel.gain : 1;
 
   const int width = direction.masked.width();
   const int height = direction.masked.height();
@@ -440,6 +469,7 @@ Result<DevelopedDirection> Developer::develop(int view, int light) const {
   double specular_negative = 0;
   double diffuse_negative = 0;
   double samples = 0;
+  double masked = 0;
   for (std::size_t i = 0; i < direction.masked.pixels().size(); ++i) {
     Rgb32f& parallel_variance = direction.specular_variance.pixels()[i];
     Rgb32f& cross_variance = direction.diffuse_variance.pixels()[i];
@@ -449,8 +479,17 @@ Result<DevelopedDirection> Developer::develop(int view, int light) const {
                            parallel_variance.array().cast<double>(),
                            cross_variance.array().cast<double>(),
                            contrasts);
-    parts.specular /= gain;
-    parts.specular_variance /= gain * gain;
+    if (to_unpolarised) {
+      const auto unpolarised = unpolarised_specular(parts.specular, findings.fresnel);
+      parts.specular = unpolarised.value_or(Eigen::Array3d::Constant(kNoNumber));
+      parts.specular_variance /= findings.fresnel.gain * findings.fresnel.gain;
+    }
+    // What polarisation cannot tell apart is not guessed.
+    if (!parts.specular.isFinite().all()) {
+      direction.masked.pixels()[i] = 1;
+      ++masked;
+      continue;
+    }
     direction.specular.pixels()[i] = parts.specular.cast<float>().matrix();
     direction.diffuse.pixels()[i] = parts.diffuse.cast<float>().matrix();
     parallel_variance = parts.specular_variance.cast<float>().matrix();
@@ -465,6 +504,7 @@ Result<DevelopedDirection> Developer::develop(int view, int light) const {
         std::min({findings.most_negative, parts.specular.minCoeff(), parts.diffuse.minCoeff()});
     samples += 3;
   }
+  findings.masked_fraction += masked / static_cast<double>(direction.masked.pixels().size());
   const Eigen::Array4d rms = (squares / std::max(1.0, samples)).sqrt();
   findings.specular_rms = rms[0];
   findings.diffuse_rms = rms[1];
@@ -474,12 +514,20 @@ Result<DevelopedDirection> Developer::develop(int view, int light) const {
   findings.diffuse_negative = diffuse_negative / std::max(1.0, samples);
   FresnelPrediction left = findings.fresnel;
   if (to_unpolarised) left.cross_fraction = 0;
-  findings.predicted = predicted_error(left,
-                                       contrasts,
-                                       findings.specular_rms,
-                                       findings.diffuse_rms,
-                                       findings.specular_noise,
-                                       findings.diffuse_noise);
+  // Texels' edges lie across pixels, and marks are known to a part of one.
+  const PlaneView& plane = rig.planes[static_cast<std::size_t>(view)];
+  constexpr double kMixedInEdge = 1.0 / 6;  // of a pixel: the mean of f (1 - f) for f in [0, 1]
+  findings.resampling =
+      2 * std::hypot(plane.rms_px, kMixedInEdge) / std::max(1.0, pixels_per_texel);
+  findings.predicted = predicted_error(
+      left,
+      contrasts,
+      findings.specular_rms,
+      findings.diffuse_rms,
+      std::hypot(findings.specular_noise,
+                 findings.resampling * step_between(direction.specular, direction.masked)),
+      std::hypot(findings.diffuse_noise,
+                 findings.resampling * step_between(direction.diffuse, direction.masked)));
   return direction;
 }
 

@@ -66,7 +66,10 @@ struct DirectionFindings {
   double specular_negative = 0, diffuse_negative = 0;  ///< part of the samples that are below 0
   double most_negative = 0;
   FresnelPrediction fresnel;  ///< at the index of the options, else 1.5
-  PredictedError predicted;   ///< of what was developed
+  /// Part of the step between neighbouring texels by which a texel may be off, since its edges lie
+  /// across pixels and the marks are known to a part of one.
+  double resampling = 0;
+  PredictedError predicted;  ///< at most, of what was developed
   /// With analysers at more than two angles: medians over the texels.
   double degree_of_polarisation = 0;
   double angle_of_polarisation_rad = 0;

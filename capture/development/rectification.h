@@ -62,7 +62,30 @@ struct RectifiedPicture {
   double pixels_per_texel =
       0;  ///< along a side, in the middle; below 1 texels are finer than pixels
 };
-/// Mean of the pixels over each texel's footprint (at least bilinear), through lens and pose.
+/// From pictures to texels through one plane, for as many pictures as one likes. A texel longer
+/// than 1.5 pixels is the mean of the pixels that it covers, each by the area; a shorter one is
+/// interpolated in. Thread-safe after construction.
+class Rectifier {
+ public:
+  /// @param width, height  of the pictures.
+  Rectifier(const PlaneView& plane, const SampleArea& area, int width, int height);
+  [[nodiscard]] RectifiedPicture rectify(const MergedPicture& picture) const;
+
+ private:
+  class Footprint;
+  struct Share {
+    std::int32_t pixel = 0;  // row * width + column
+    float weight = 0;
+  };
+  int columns_ = 0, rows_ = 0;
+  int width_ = 0, height_ = 0;
+  double pixels_per_texel_ = 0;
+  // Shares of texel i: [first_[i], first_[i + 1]) of shares_; none where it lies off the picture.
+  std::vector<std::size_t> first_;
+  std::vector<Share> shares_;
+};
+
+/// The same for a single picture.
 [[nodiscard]] RectifiedPicture rectify(const MergedPicture& picture,
                                        const PlaneView& plane,
                                        const SampleArea& area);

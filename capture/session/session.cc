@@ -103,7 +103,8 @@ class Session {
     return bracket;
   }
   static Shot shot_of(const Place& place, int analyser, std::size_t exposure, bool dark) {
-    return {place.target, place.view, place.light, analyser, static_cast<int>(exposure), dark};
+    return {
+        place.target, place.view, place.light, analyser, static_cast<int>(exposure), dark, false};
   }
   [[nodiscard]] bool has_all(const Place& place, int analyser, bool dark, std::size_t n) const {
     for (std::size_t i = 0; i < n; ++i) {
@@ -215,7 +216,7 @@ class Session {
     VENEER_TRY(recording_.add(picture));
     ++outcome_.taken;
     progress_.advance();
-    if (shot.dark) return {};
+    if (shot.dark || shot.repeat) return {};
     return check_light(picture);
   }
 
@@ -309,6 +310,9 @@ class Session {
           VENEER_TRY(take_picture(shot_of(place, analyser, i, false), bracket[i]));
       }
       VENEER_TRY(compare(place));
+      Shot repeat = shot_of(place, begin_, 0, false);
+      repeat.repeat = true;
+      VENEER_TRY(take_picture(repeat, bracket.front()));
     }
     progress_.finish();
     return {};
@@ -317,7 +321,7 @@ class Session {
   [[nodiscard]] std::int64_t expected(std::size_t exposures, const Place& place) const {
     const std::size_t each =
         exposures > 0 ? exposures : static_cast<std::size_t>(plan_.exposure.most);
-    std::int64_t count = 0;
+    std::int64_t count = 1;  // the repeat
     for (std::size_t i = 0; i < each; ++i) {
       for (int a = 0; a < analysers_; ++a)
         count += recording_.has(shot_of(place, a, i, false)) ? 0 : 1;

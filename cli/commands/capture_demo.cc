@@ -17,6 +17,8 @@ Result<int> capture_demo(CommandLine& line) {
   fs::path etc = default_etc();
   int frames = 120;
   CLI::App& app = line.app();
+  std::string sub_command;
+  app.add_option("demo", sub_command)->required();
   app.add_option("-o,--output", out, "Where everything is written")->capture_default_str();
   app.add_option("--frames", frames, "Frames that veneerd draws of the turning plate")
       ->capture_default_str()

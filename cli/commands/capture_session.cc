@@ -105,9 +105,14 @@ Status open_devices(Rig& rig,
     VENEER_ASSIGN(rig.studio, simulation::VirtualStudio::create(truth, plan, cache, progress));
     return {};
   }
-  std::string layout;  // a mosaic on the sensor needs nothing that turns
   VENEER_ASSIGN(rig.camera, capture::open_camera(camera));
-  VENEER_ASSIGN(rig.polariser, capture::open_polariser(polariser, rig.hands));
+  // A mosaic on the sensor has nothing that turns; what the camera is, its first picture says.
+  VENEER_ASSIGN(const capture::CameraFrame first, rig.camera->grab());
+  if (first.mosaic == capture::Mosaic::kNone) {
+    VENEER_ASSIGN(rig.polariser, capture::open_polariser(polariser, rig.hands));
+  } else {
+    polariser.ignore_the_rest();
+  }
   return toml.finish();
 }
 
@@ -214,6 +219,8 @@ Result<int> capture_board(CommandLine& line) {
   fs::path out;
   double dots_per_inch = 600;
   CLI::App& app = line.app();
+  std::string sub_command;
+  app.add_option("board", sub_command)->required();
   app.add_option("--rig", rig, "Whose [board] is meant, rig.toml")->required();
   app.add_option("-o,--output", out, "The picture to print, a PNG")->required();
   app.add_option("--dpi", dots_per_inch, "Of the printer")
