@@ -81,7 +81,7 @@ class Rectifier::Footprint {
   Footprint(const PlaneView& plane, const SampleArea& area, int width, int height)
       : projection_(plane, area), width_(width), height_(height) {}
 
-  /// Shares that add up to 1; none where part of the texel lies off the picture.
+  /// None where part of the texel lies off the picture.
   void gather(int column, int row, std::vector<Share>& shares) {
     shares.clear();
     const auto side = projection_.side_px(column, row);
@@ -91,10 +91,6 @@ class Rectifier::Footprint {
     } else {
       average(column, row, shares);
     }
-    double total = 0;
-    for (const Share& share : shares) total += share.weight;
-    if (!(total > 0)) shares.clear();
-    for (Share& share : shares) share.weight = static_cast<float>(share.weight / total);
   }
 
  private:
@@ -123,6 +119,20 @@ class Rectifier::Footprint {
         add(x + 1, y + 1, a * b, shares);
       }
     }
+    merge_equal(shares);
+  }
+  /// One share a pixel, so that its noise is counted once.
+  static void merge_equal(std::vector<Share>& shares) {
+    std::ranges::sort(shares, {}, &Share::pixel);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < shares.size(); ++i) {
+      if (kept > 0 && shares[kept - 1].pixel == shares[i].pixel) {
+        shares[kept - 1].weight += shares[i].weight;
+      } else {
+        shares[kept++] = shares[i];
+      }
+    }
+    shares.resize(kept);
   }
   /// Every pixel by the area that the texel covers of it: a pixel is the mean over its square.
   void average(int column, int row, std::vector<Share>& shares) {
@@ -197,18 +207,20 @@ RectifiedPicture Rectifier::rectify(const MergedPicture& picture) const {
   for (std::size_t texel = 0; texel + 1 < first_.size(); ++texel) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     Eigen::Vector3d variance = Eigen::Vector3d::Zero();
-    bool good = first_[texel] < first_[texel + 1];
+    double total = 0;
+    bool good = true;
     for (std::size_t i = first_[texel]; i < first_[texel + 1]; ++i) {
       const Share& share = shares_[i];
       const auto pixel = static_cast<std::size_t>(share.pixel);
       good = good && saturated[pixel] == 0 && light[pixel].allFinite() && noise[pixel].allFinite();
       const double weight = share.weight;
+      total += weight;
       sum += weight * light[pixel].cast<double>();
       variance += weight * weight * noise[pixel].cast<double>();
     }
-    if (!good) continue;
-    rectified.light.pixels()[texel] = sum.cast<float>();
-    rectified.variance.pixels()[texel] = variance.cast<float>();
+    if (!good || !(total > 0)) continue;
+    rectified.light.pixels()[texel] = (sum / total).cast<float>();
+    rectified.variance.pixels()[texel] = (variance / (total * total)).cast<float>();
     rectified.masked.pixels()[texel] = 0;
   }
   return rectified;
