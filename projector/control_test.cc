@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "projector/control.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+
+namespace veneer::projector {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+ProjectorState whole_state() {
+  ProjectorState state;
+  state.power = Power::kOn;
+  state.input = "digital1";
+  state.muted = false;
+  state.frozen = false;
+  state.locked = true;
+  state.lamps = {{1234, true}, {99, false}};
+  state.health = {{"fan", Health::kOk}, {"lamp", Health::kOk}};
+  state.degamma = false;
+  state.processing = true;
+  state.led_levels = LedLevels{100, 120, 90};
+  state.maker = "Maker";
+  state.model = "Model";
+  state.name = "Hall 3";
+  state.serial = "S1";
+  state.firmware = "4.1.0";
+  return state;
+}
+
+TEST(ProjectorState, WhatIsNotToldIsNotInTheRecord) {
+  EXPECT_THAT(to_record({}), IsEmpty());
+  const ControlRecord record = to_record(whole_state());
+  EXPECT_EQ(record.at("projector.lamp_hours"), "1234 99");
+  EXPECT_EQ(record.at("projector.lamps_on"), "on off");
+  EXPECT_EQ(record.at("projector.led_levels"), "100 120 90");
+  EXPECT_EQ(record.at("projector.degamma"), "off");
+  EXPECT_EQ(record.at("projector.health.fan"), "ok");
+  EXPECT_EQ(record.size(), 17U);  // 15 values and two parts' health
+}
+
+TEST(ProjectorState, AStateDoesNotDifferFromItselfOrFromSilence) {
+  EXPECT_THAT(differences(whole_state(), whole_state()), IsEmpty());
+  EXPECT_THAT(differences(whole_state(), ProjectorState{}), IsEmpty());
+  EXPECT_THAT(differences(ProjectorState{}, whole_state()), IsEmpty());
+}
+
+TEST(ProjectorState, EveryChangeThatMovesColoursIsNamedAlone) {
+  const std::vector<std::pair<const char*, std::function<void(ProjectorState&)>>> changes{
+      {"the power was \"on\" and is \"cooling\"",
+       [](ProjectorState& s) { s.power = Power::kCooling; }},
+      {"input", [](ProjectorState& s) { s.input = "rgb1"; }},
+      {"mute", [](ProjectorState& s) { s.muted = true; }},
+      {"freeze", [](ProjectorState& s) { s.frozen = true; }},
+      {"degamma", [](ProjectorState& s) { s.degamma = true; }},
+      {"processing", [](ProjectorState& s) { s.processing = false; }},
+      {"LED levels",
+       [](ProjectorState& s) {
+         s.led_levels = LedLevels{100, 120, 91};
+       }},
+      {"which lamps burn",
+       [](ProjectorState& s) {
+         s.lamps = {{1234, true}, {99, true}};
+       }},
+      {"lamp 1 was replaced",
+       [](ProjectorState& s) {
+         s.lamps = {{3, true}, {99, false}};
+       }},
+      {"model", [](ProjectorState& s) { s.model = "Other"; }},
+      {"serial", [](ProjectorState& s) { s.serial = "S2"; }},
+      {"firmware", [](ProjectorState& s) { s.firmware = "4.4.0"; }},
+  };
+  for (const auto& [text, change] : changes) {
+    ProjectorState now = whole_state();
+    change(now);
+    EXPECT_THAT(differences(whole_state(), now), ElementsAre(HasSubstr(text)));
+  }
+}
+
+TEST(ProjectorState, HoursThatPassAndANameAreNoChange) {
+  ProjectorState now = whole_state();
+  now.lamps = {{1250, true}, {99, false}};
+  now.name = "Hall 4";
+  now.health["fan"] = Health::kWarning;
+  EXPECT_THAT(differences(whole_state(), now), IsEmpty());
+}
+
+TEST(ProjectorState, ARecordThatSomebodyWroteDoesNotConfuseIt) {
+  ControlRecord then = to_record(whole_state());
+  for (const char* text : {"", "x", "-", "99999999999999999999", "12 x", " 5"}) {
+    then["projector.lamp_hours"] = text;
+    EXPECT_THAT(differences(then, to_record(whole_state())), IsEmpty()) << text;
+  }
+}
+
+TEST(ProjectorState, WhatSpoilsColoursIsWarnedOf) {
+  EXPECT_THAT(warnings(whole_state()), IsEmpty());
+  EXPECT_THAT(warnings({}), IsEmpty());
+  ProjectorState bad = whole_state();
+  bad.power = Power::kWarmUp;
+  bad.frozen = true;
+  bad.muted = true;
+  bad.degamma = true;
+  bad.locked = false;
+  bad.health["fan"] = Health::kError;
+  EXPECT_THAT(warnings(bad),
+              ElementsAre(HasSubstr("warming up"),
+                          HasSubstr("unfreeze"),
+                          HasSubstr("unblank"),
+                          HasSubstr("degamma"),
+                          HasSubstr("cable"),
+                          HasSubstr("fan error")));
+}
+
+/// Has only what every control must have.
+class PlainControl final : public ProjectorControl {
+ public:
+  [[nodiscard]] std::string description() const override { return "the plain one"; }
+  [[nodiscard]] Result<ProjectorState> read_state() override { return ProjectorState{}; }
+  [[nodiscard]] Status power(bool) override { return {}; }
+  [[nodiscard]] Status mute(bool) override { return {}; }
+  [[nodiscard]] Status freeze(bool) override { return {}; }
+  [[nodiscard]] Status select_input(const std::string&) override { return {}; }
+};
+
+TEST(ProjectorControl, WhatAProjectorCannotIsSaidWithItsName) {
+  PlainControl control;
+  for (const Status& status : {control.set_degamma(false),
+                               control.set_led_levels({1, 2, 3}),
+                               control.set_processing(false),
+                               control.show_test_pattern("solid")}) {
+    ASSERT_FALSE(status);
+    EXPECT_EQ(status.error().code, Errc::kUnavailable);
+    EXPECT_THAT(status.error().what, HasSubstr("the plain one"));
+  }
+}
+
+}  // namespace
+}  // namespace veneer::projector
