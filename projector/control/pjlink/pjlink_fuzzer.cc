@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+
+#include "projector/control/pjlink/pjlink_protocol.h"
+
+using namespace veneer;
+using namespace veneer::projector;
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
+
+namespace {
+
+void law(bool holds, const char* what) {
+  if (holds) return;
+  std::fprintf(stderr, "broken: %s\n", what);
+  std::abort();
+}
+
+template <class T>
+void has_text(const Result<T>& result) {
+  law(result.has_value() || !result.error().what.empty(), "a refusal without a text");
+}
+
+}  // namespace
+
+/// A line of any bytes, taken for everything that a line may be.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string_view line(reinterpret_cast<const char*>(data), size);
+  const auto greeting = pjlink::read_greeting(line);
+  has_text(greeting);
+  if (greeting && greeting->seed) law(greeting->seed->size() == 8, "a seed of another length");
+  const pjlink::Request request{1, "LAMP", "?"};
+  const auto reply = pjlink::read_reply(line, request);
+  has_text(reply);
+  if (reply && reply->refusal != 0)
+    law(!pjlink::error_of(*reply, request).what.empty(), "a refusal without a text");
+  const std::string_view parameter = reply ? std::string_view(reply->parameter) : line;
+  const auto lamps = pjlink::read_lamps(parameter);
+  has_text(lamps);
+  if (lamps) {
+    law(!lamps->empty() && lamps->size() <= 8, "too many lamps, or none");
+    law(std::ranges::all_of(*lamps, [](const Lamp& lamp) { return lamp.hours >= 0; }),
+        "hours below zero");
+  }
+  const auto health = pjlink::read_health(parameter);
+  has_text(health);
+  if (health) law(health->size() == 6, "health of other than six parts");
+  has_text(pjlink::read_power(parameter));
+  has_text(pjlink::read_mute(parameter));
+  has_text(pjlink::read_flag(parameter));
+  const auto name = pjlink::input_name(parameter);
+  has_text(name);
+  if (name)
+    law(pjlink::input_code(*name) == std::string(parameter), "an input's name is another's");
+  has_text(pjlink::input_code(parameter));
+  const std::string text = pjlink::readable(line);
+  law(text.size() <= line.size() && pjlink::readable(text) == text,
+      "a text does not stay readable");
+  return 0;
+}
