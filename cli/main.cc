@@ -32,6 +32,7 @@ constexpr std::array kCommands{
     Command{
         "harness", "Rehearse the daemon with a tracker that fails as planned", &cli::run_harness},
     Command{"import", "Bring measured data of another format to a sample set", &cli::run_import},
+    Command{"projector", "Say how a projector is, and switch it", &cli::run_projector},
     Command{"render", "Draw one projector frame of a scene", &cli::run_render},
     Command{"synthesize", "Path-trace a material as a sample set", &cli::run_synthesize},
     Command{"track", "List, watch and record trackers", &cli::run_track},

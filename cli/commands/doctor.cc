@@ -8,6 +8,7 @@
 #include "capture/cameras/cameras.h"
 #include "cli/commands/commands.h"
 #include "cli/ranks/ranks.h"
+#include "projector/control/dlpc350/dlpc350.h"
 #include "projector/outputs/window/displays.h"
 #include "render/egl_context.h"
 #include "tracking/usb_access.h"
@@ -100,6 +101,25 @@ Cameras look_at_cameras() {
   return result;
 }
 
+/// The light engines on USB, and what keeps them from being controlled.
+nlohmann::ordered_json look_at_light_engines(std::string& text) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const projector::ConnectedLightEngine& each : projector::connected_light_engines()) {
+    json.push_back({{"model", each.model},
+                    {"serial", each.serial},
+                    {"node", each.node},
+                    {"usable", each.may_open}});
+    text += fmt::format("\nlight engine  {} at {}{}",
+                        each.model,
+                        each.node,
+                        each.may_open ? ""
+                                      : ": may not be opened; install "
+                                        "etc/udev/60-veneer-projectors.rules");
+  }
+  if (text.empty()) text = "\nlight engine  none on USB";
+  return json;
+}
+
 /// The displays of the desktop; none where there is no desktop, which a daemon does not need.
 nlohmann::ordered_json look_at_displays(std::string& text) {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
@@ -128,6 +148,8 @@ Result<int> run_doctor(CommandLine& line) {
   const Instruments instruments = look_at_instruments();
   line.note("asking for cameras; those on Ethernet have a second to answer");
   const Cameras cameras = look_at_cameras();
+  std::string light_engines_text;
+  const nlohmann::ordered_json light_engines = look_at_light_engines(light_engines_text);
   std::string displays_text;
   const nlohmann::ordered_json displays = look_at_displays(displays_text);
   line.print({{"gl", gl},
@@ -139,8 +161,9 @@ Result<int> run_doctor(CommandLine& line) {
               {"instruments", instruments.json},
               {"cameras", cameras.json},
               {"cameras_failed", cameras.failed},
+              {"light_engines", light_engines},
               {"displays", displays}},
-             fmt::format("OpenGL   {}{}\nBLAS     {}\nMPI      {}\nthreads  {}{}{}{}{}",
+             fmt::format("OpenGL   {}{}\nBLAS     {}\nMPI      {}\nthreads  {}{}{}{}{}{}",
                          egl ? "" : "not usable: ",
                          gl,
                          blas,
@@ -149,6 +172,7 @@ Result<int> run_doctor(CommandLine& line) {
                          trackers.text,
                          instruments.text,
                          cameras.text,
+                         light_engines_text,
                          displays_text));
   return egl && trackers.all_usable ? kExitDone : kExitFailed;
 }
