@@ -94,7 +94,7 @@ TEST(CaptureStokes, RefusesWhatItCannotUse) {
   write(colour, Image<Rgb8>(4, 4, Rgb8{1, 2, 3}));
   write(odd, Image<Rgb8>(5, 4));
   const std::string mono = " --layout polarsens-mono ";
-  EXPECT_TRUE(fails(run("veneer capture"), 2, "stokes IMAGE"));
+  EXPECT_TRUE(fails(run("veneer capture"), 2, "--rig"));
   EXPECT_TRUE(fails(run("veneer capture stokes " + image), 2, "--layout"));
   EXPECT_TRUE(
       fails(run("veneer capture stokes " + image + " --layout bayer"), 2, "polarsens-mono"));

@@ -257,8 +257,6 @@ ordered_json report_of(const WizardResults& results,
   return json;
 }
 
-std::string report_page(const ordered_json& report) {
-  return page_with_data(kPage, report);
-}
+std::string report_page(const ordered_json& report) { return page_with_data(kPage, report); }
 
 }  // namespace veneer::calibration
