@@ -192,6 +192,7 @@ Result<DevelopedDirection> Developer::develop(int view, int light) const {
   direction.specular = Image<Rgb32f>(width, height);
   direction.diffuse = Image<Rgb32f>(width, height);
   Eigen::Array4d squares = Eigen::Array4d::Zero();  // specular, diffuse, and their noise
+  double all_squares = 0;
   double specular_negative = 0;
   double diffuse_negative = 0;
   double samples = 0;
@@ -224,6 +225,7 @@ Result<DevelopedDirection> Developer::develop(int view, int light) const {
                               parts.diffuse.square().sum(),
                               parts.specular_variance.sum(),
                               parts.diffuse_variance.sum());
+    all_squares += (parts.specular + parts.diffuse).square().sum();
     specular_negative += static_cast<double>((parts.specular < 0).count());
     diffuse_negative += static_cast<double>((parts.diffuse < 0).count());
     findings.most_negative =
@@ -245,10 +247,20 @@ Result<DevelopedDirection> Developer::develop(int view, int light) const {
   constexpr double kMixedInEdge = 1.0 / 6;  // of a pixel: the mean of f (1 - f) for f in [0, 1]
   findings.resampling =
       2 * std::hypot(plane.rms_px, kMixedInEdge) / std::max(1.0, pixels_per_texel);
+  // What was found of the specular light is its part that is not lost; that is put back, up to all
+  // light that there is. A misalignment, of which the mirror shows only the cosine, may have lost
+  // more where the plane turns.
+  const double turned = std::abs(std::sin(2 * left.azimuth_rad));
+  const double q = contrasts.specular.minCoeff();
+  const double kept = std::abs(1 - 2 * left.cross_fraction) -
+                      (to_unpolarised ? 0 : turned * std::sqrt(std::max(0.0, 1 - q * q)));
+  const double all_rms = std::sqrt(all_squares / std::max(1.0, samples));
+  const double specular_rms = std::min(findings.specular_rms / std::max(kept, 1e-9),
+                                       std::max(all_rms, findings.specular_rms));
   findings.predicted = predicted_error(
       left,
       contrasts,
-      findings.specular_rms,
+      specular_rms,
       findings.diffuse_rms,
       std::hypot(findings.specular_noise,
                  findings.resampling * step_between(direction.specular, direction.masked)),
