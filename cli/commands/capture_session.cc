@@ -196,14 +196,7 @@ Result<int> capture_session(CommandLine& line) {
     VENEER_TRY(place_lights(plan));
     VENEER_TRY(open_devices(rig, toml, plan, options, line.progress()));
     VENEER_TRY(plan.check());
-    Result<capture::SessionOutcome> outcome =
-        capture::run_session(plan, options.out, rig.devices(), line.progress());
-    if (!outcome)
-      return fail(outcome.error().code,
-                  "{}; what was captured is kept in {}: the same command goes on from there",
-                  outcome.error().what,
-                  options.out.string());
-    session = std::move(*outcome);
+    VENEER_ASSIGN(session, capture::run_session(plan, options.out, rig.devices(), line.progress()));
   }
   VENEER_ASSIGN(const nlohmann::ordered_json summary, develop(options, session, line.progress()));
   line.print(summary,
