@@ -3,18 +3,17 @@
 
 #include <string>
 
+#include "capture/polarisation/mosaic.h"
+
 namespace veneer::capture {
 
 Result<Mosaic> read_layout(TomlReader& config) {
   if (!config.contains("layout")) return Mosaic::kNone;
   std::string name;
   config.read("layout", name);
-  if (name == "polarsens-mono") return Mosaic::kPolarMono;
-  if (name == "polarsens-colour") return Mosaic::kPolarColour;
-  return fail(Errc::kInvalidOption,
-              "opening the camera: there is no layout \"{}\"; set layout to \"polarsens-mono\" or "
-              "\"polarsens-colour\", or leave it out for a sensor without analysers on it",
-              name);
+  Result<Mosaic> mosaic = mosaic_named(name);
+  if (!mosaic) return fail_while("opening the camera: the key layout", mosaic.error());
+  return mosaic;
 }
 
 int cell_size(Mosaic mosaic) {
