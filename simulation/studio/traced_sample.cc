@@ -2,11 +2,11 @@
 #include "simulation/studio/traced_sample.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
+#include <stdlib.h>
 
-#include <atomic>
 #include <cmath>
 #include <optional>
+#include <string>
 #include <system_error>
 
 #include "btf/sample_set.h"
@@ -56,10 +56,12 @@ bool fits(const btf::SampleSet& set, const SynthesisOptions& options) {
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    static std::atomic<int> number{0};
     std::error_code ignored;
-    path_ = std::filesystem::temp_directory_path(ignored) /
-            fmt::format("veneer_studio_{}_{}", ::getpid(), number++);
+    std::string name =
+        (std::filesystem::temp_directory_path(ignored) / "veneer-studio-XXXXXX").string();
+    // Where none can be made, writing to the name fails and says so.
+    (void)::mkdtemp(name.data());
+    path_ = name;
   }
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
