@@ -31,6 +31,11 @@ pkg_check_modules(LIBUSB REQUIRED IMPORTED_TARGET libusb-1.0)
 pkg_check_modules(HIDAPI REQUIRED IMPORTED_TARGET hidapi-hidraw)
 pkg_check_modules(LIBMD REQUIRED IMPORTED_TARGET libmd)
 pkg_check_modules(UDEV REQUIRED IMPORTED_TARGET libudev)
+pkg_check_modules(DRM REQUIRED IMPORTED_TARGET libdrm)
+pkg_check_modules(GBM REQUIRED IMPORTED_TARGET gbm)
+pkg_check_modules(SYSTEMD REQUIRED IMPORTED_TARGET libsystemd)
+find_package(sdbus-c++ REQUIRED)
+find_package(prometheus-cpp REQUIRED COMPONENTS core pull)
 pkg_check_modules(EPOXY REQUIRED IMPORTED_TARGET epoxy)
 # The generic names that OpenBLAS also provides: a machine may have ATLAS behind them, which is six
 # times slower, so OpenBLAS is named outright.

@@ -39,6 +39,9 @@ class MovingTracker final : public tracking::Tracker {
 /// Remembers what it was asked to draw.
 class RecordingRenderer final : public render::Renderer {
  public:
+  void release() override {}
+  bool lost() override { return false; }
+  void draw_to_scanout(std::size_t /*buffer*/) override {}
   Status set_profile(const render::PreparedProfile&) override { return {}; }
   void draw(const render::FrameInput& input) override { inputs.push_back(input); }
   void read_codes(ImageView<Rgb16> codes) override { codes(0, 0) = {7, 8, 9}; }

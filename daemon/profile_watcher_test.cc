@@ -34,6 +34,9 @@ calibration::ProjectorProfile profile_at(double metres, int width = 16) {
 /// Remembers which profiles it was given, and refuses them if it is told to.
 class RememberingRenderer final : public render::Renderer {
  public:
+  void release() override {}
+  bool lost() override { return false; }
+  void draw_to_scanout(std::size_t /*buffer*/) override {}
   Status set_profile(const render::PreparedProfile& profile) override {
     if (refuses) return fail(Errc::kUnavailable, "the driver says no");
     distances.push_back(profile.profile().reference_distance_m);

@@ -215,6 +215,11 @@ void EglContext::make_current() const {
       EGL_TRUE);
 }
 
+void EglContext::release() const {
+  if (eglGetCurrentContext() != state_->context) return;
+  eglMakeCurrent(state_->display->handle(), EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+}
+
 const std::string& EglContext::description() const { return state_->description; }
 
 }  // namespace veneer::render

@@ -26,6 +26,8 @@ class EglContext {
 
   /// Makes this context the thread's current one; costs next to nothing where it already is.
   void make_current() const;
+  /// Leaves the thread without a context, so that another thread can make this one its own.
+  void release() const;
   /// "llvmpipe (LLVM 15.0.6, 256 bits), 4.5 (Core Profile) Mesa 22.3.6, through surfaceless".
   [[nodiscard]] const std::string& description() const;
 

@@ -68,6 +68,15 @@ class GlRenderer final : public Renderer {
 
   ~GlRenderer() override { context_.make_current(); }
 
+  void release() override { context_.release(); }
+
+  bool lost() override {
+    context_.make_current();
+    return glGetGraphicsResetStatus() != GL_NO_ERROR;
+  }
+
+  void draw_to_scanout(std::size_t /*buffer*/) override { VENEER_CHECK(false); }
+
   Status set_profile(const PreparedProfile& prepared) override {
     VENEER_TRY(check_exchangeable({width_, height_, bits_}, prepared.profile()));
     context_.make_current();
@@ -168,7 +177,8 @@ class GlRenderer final : public Renderer {
 Result<std::unique_ptr<Renderer>> Renderer::create(const Scene& scene,
                                                    const btf::Material& material,
                                                    const calibration::ProjectorProfile& profile,
-                                                   const RendererOptions& options) {
+                                                   const RendererOptions& options,
+                                                   const Scanout* /*scanout*/) {
   VENEER_TRY(check(scene));
   auto prepared = PreparedProfile::prepare(profile, options);
   if (!prepared) return fail_while("making a renderer", prepared.error());

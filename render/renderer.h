@@ -11,6 +11,7 @@
 #include "base/image.h"
 #include "base/result.h"
 #include "base/rigid_transform.h"
+#include "base/scanout.h"
 #include "btf/material.h"
 #include "calibration/profile.h"
 #include "render/angular_cache_options.h"
@@ -38,6 +39,9 @@ struct RendererOptions {
   /// Profiles will be exchanged while frames are drawn: what another one may need is compiled at
   /// the start.
   bool exchangeable = false;
+  /// No code is sent for which the profile's model says more light than this, cd/m^2 of a perfect
+  /// diffuser where G is 1; enforced after all else. 0: no ceiling. A pixel over it keeps its hue.
+  double luminance_ceiling = 0;
 };
 
 /// What one frame needs to know.
@@ -58,20 +62,33 @@ struct FrameStatistics {
   std::uint64_t out_of_reach_pixels = 0;  ///< below the geometry floor
   double gamut_loss_mean =
       0;  ///< mean colour difference dE in IPT x 100 that mapping made, over the covered
-  std::optional<double> gpu_ms;  ///< GL timer query: draw and compensation
+  std::uint64_t held_pixels = 0;  ///< brought down to RendererOptions::luminance_ceiling
+  std::optional<double> gpu_ms;   ///< GL timer query: draw and compensation
+  std::optional<double> draw_ms;  ///< of this, the draw pass
 };
 
 /// Draws a scene's material as the projector must show it. Owns the EGL context and every GL
-/// object; bound to the thread that made it.
+/// object. Used by one thread at a time: the one that made it, until that calls release(); then by
+/// the next that calls anything.
 class Renderer {
  public:
-  /// Errors: kUnavailable (no EGL, no GL 4.5; says what there is), kBadFormat, kInvalidOption.
+  /// @param scanout  the display's buffers, if draw_to_scanout() will be called; borrowed, must
+  /// outlive the renderer.
+  /// Errors: kUnavailable (no EGL, no GL 4.5, buffers that cannot be imported; says what there is),
+  /// kBadFormat, kInvalidOption.
   [[nodiscard]] static Result<std::unique_ptr<Renderer>> create(
       const Scene& scene,
       const btf::Material& material,
       const calibration::ProjectorProfile& profile,
-      const RendererOptions& options);
+      const RendererOptions& options,
+      const Scanout* scanout = nullptr);
   virtual ~Renderer() = default;
+  /// Lets go of the thread, so that another can draw (or destroy) it.
+  virtual void release() = 0;
+  /// Whether the GPU was reset and has forgotten everything: what was drawn since then is worth
+  /// nothing, and only a new renderer will draw again. Asks the driver; neither waits nor
+  /// allocates.
+  [[nodiscard]] virtual bool lost() = 0;
 
   /// From the next frame on, draws for another profile. Only uploads; all that takes long was done
   /// when the profile was prepared, with this renderer's options.
@@ -79,6 +96,10 @@ class Renderer {
   [[nodiscard]] virtual Status set_profile(const PreparedProfile& profile) = 0;
   /// Issues the GL commands of one frame. No allocation, no read-back, no wait.
   virtual void draw(const FrameInput& input) = 0;
+  /// Issues the commands that bring the last frame's codes into a buffer of the display: as they
+  /// are, in the low bits of 8-bit channels, or widened to 10 where the format has more than the
+  /// profile.
+  virtual void draw_to_scanout(std::size_t buffer) = 0;
   /// Waits for the last frame and reads it: codes of ProjectorProfile::bits bits, first row on top.
   virtual void read_codes(ImageView<Rgb16> codes) = 0;
   /// The same for the target luminance before compensation, XYZ in cd/m^2 (0 outside the object).

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+#include "base/clock.h"
+#include "base/result.h"
+#include "btf/material.h"
+#include "calibration/profile.h"
+#include "projector/control.h"
+#include "projector/output.h"
+#include "render/renderer.h"
+#include "render/scene.h"
+#include "tracking/tracker.h"
+
+namespace veneer::daemon {
+
+/// How veneerd gets at what it works with, each called anew after a loss. Rehearsals put in others,
+/// which fail when they are told to.
+struct Devices {
+  std::function<Result<std::unique_ptr<tracking::Tracker>>(Clock&)> open_tracker;
+  std::function<Result<std::unique_ptr<projector::Output>>()> open_output;
+  /// Empty where the projector cannot be asked.
+  std::function<Result<std::unique_ptr<projector::ProjectorControl>>(Clock&)> open_control;
+  std::function<Result<std::unique_ptr<render::Renderer>>(const render::Scene&,
+                                                          const btf::Material&,
+                                                          const calibration::ProjectorProfile&,
+                                                          const render::RendererOptions&,
+                                                          const Scanout*)>
+      make_renderer;
+  /// Called by the frame loop before each frame, with its number and the time; may be empty. In
+  /// virtual time it may call ServiceControl, which then does what it is told before it returns.
+  std::function<void(std::uint64_t, Time)> before_frame;
+};
+
+}  // namespace veneer::daemon
