@@ -6,6 +6,7 @@
 #include <string>
 
 #include "projector/outputs/file/file_output.h"
+#include "projector/outputs/kms/kms_output.h"
 #include "projector/outputs/null/null_output.h"
 #include "projector/outputs/window/window_output.h"
 
@@ -20,6 +21,8 @@ Result<std::unique_ptr<Output>> open_as_output(TomlReader& config) {
 constexpr std::array kOutputs{
     OutputDriver{
         "file", "PNG files of the drive codes, EXR of the target", &open_as_output<FileOutput>},
+    OutputDriver{
+        "kms", "a display of a graphics card, without a desktop", &open_as_output<KmsOutput>},
     OutputDriver{"null", "nowhere, for timing", &open_as_output<NullOutput>},
     OutputDriver{"window", "a window on the desktop", &open_as_output<WindowOutput>},
 };

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "projector/outputs/kms/edid.h"
+#include "projector/outputs/kms/kms_device.h"
+
+namespace veneer::projector {
+
+/// Which parts of a card show the picture on which display.
+struct DisplayChoice {
+  KmsConnector connector;
+  EdidIdentity identity;
+  KmsMode mode;
+  KmsId crtc = 0;
+  KmsPlane plane;  ///< the primary one
+};
+
+/// The connector of that name, or the connected one whose EDID has that monitor name or serial;
+/// with an empty text, the only connected one. Errors: kInvalidOption (no such display, or several:
+/// lists all), kUnavailable (none connected).
+[[nodiscard]] Result<DisplayChoice> choose_display(KmsDevice& device,
+                                                   std::string_view connector,
+                                                   std::string_view mode);
+
+/// "1920x1080" (the display's preferred rate, or else its first) or "1920x1080@60" (the nearest
+/// rate within half a hertz); empty: the preferred mode, or else the first. Never an interlaced
+/// one. Errors: kInvalidOption (lists the modes).
+[[nodiscard]] Result<KmsMode> choose_mode(const KmsConnector& connector, std::string_view mode);
+
+/// "1920x1080@60.00".
+[[nodiscard]] std::string name_of(const KmsMode& mode);
+/// "HDMI-A-1: EPSON PJ, serial 1234".
+[[nodiscard]] std::string name_of(const KmsConnector& connector);
+
+}  // namespace veneer::projector
