@@ -2,11 +2,12 @@
 // In an emulated machine with a virtual graphics card: shows a known picture through the real
 // output, so that what is scanned out can be compared with what was sent.
 //
-//   veneer_kms_lab_test [--seconds S] [--png FILE] [--frames N] [KEY=VALUE...]
+//   veneer_kms_lab_test [--seconds S] [--png FILE] [--frames N] [--draw WxH] [KEY=VALUE...]
 //
 // shows N frames of which the last one is the known picture, holds it for S seconds and writes it
-// to FILE. KEY=VALUE are keys of [output] in TOML's syntax (mode="1024x768"). "presented" is
-// printed once the picture is on the screen. Exit status 0, or 1 with what went wrong.
+// to FILE; with --draw 1024x768 it writes that picture of 8 bits alone and opens nothing. KEY=VALUE
+// are keys of [output] in TOML's syntax (mode="1024x768"). "presented" is printed once the picture
+// is on the screen. Exit status 0, or 1 with what went wrong.
 #include <unistd.h>
 
 #include <charconv>
@@ -49,9 +50,23 @@ Image<Rgb16> known_picture(int width, int height, int bits) {
   return picture;
 }
 
+/// As PNG of 8 or 16 bits, code for code.
+Status write(const Image<Rgb16>& picture, int bits, const std::string& path) {
+  if (path.empty()) return {};
+  if (bits > 8) return write_png(path, picture.view());
+  Image<Rgb8> eight(picture.width(), picture.height());
+  for (std::size_t i = 0; i < picture.pixels().size(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c)
+      eight.pixels()[i][c] = static_cast<std::uint8_t>(picture.pixels()[i][c]);
+  }
+  return write_png(path, eight.view());
+}
+
 struct Arguments {
   int seconds = 5;
   int frames = 60;
+  int draw_width = 0;  // 0: show it
+  int draw_height = 0;
   std::string png;
   std::string keys;
 };
@@ -70,10 +85,19 @@ Result<Arguments> parse(int argc, char** argv) {
       const auto parsed = std::from_chars(value.data(), value.data() + value.size(), into);
       return parsed.ec == std::errc{} && parsed.ptr == value.data() + value.size() && into > 0;
     };
+    const auto size = [value, &arguments] {
+      const char* end = value.data() + value.size();
+      const auto width = std::from_chars(value.data(), end, arguments.draw_width);
+      if (width.ec != std::errc{} || width.ptr == end || *width.ptr != 'x') return false;
+      const auto height = std::from_chars(width.ptr + 1, end, arguments.draw_height);
+      return height.ec == std::errc{} && height.ptr == end && arguments.draw_width > 0 &&
+             arguments.draw_height > 0;
+    };
     if (argument == "--png") {
       arguments.png = value;
     } else if (!(argument == "--seconds" && number(arguments.seconds)) &&
-               !(argument == "--frames" && number(arguments.frames))) {
+               !(argument == "--frames" && number(arguments.frames)) &&
+               !(argument == "--draw" && size())) {
       return fail(Errc::kInvalidOption, "{} {} is not understood", argument, value);
     }
   }
@@ -81,6 +105,8 @@ Result<Arguments> parse(int argc, char** argv) {
 }
 
 Status show(const Arguments& arguments) {
+  if (arguments.draw_width > 0)
+    return write(known_picture(arguments.draw_width, arguments.draw_height, 8), 8, arguments.png);
   VENEER_ASSIGN(const std::vector<KmsDisplay> displays, kms_displays());
   for (const KmsDisplay& each : displays)
     fmt::print("{} {} ({}): {}{}, \"{}\", {} modes\n",
@@ -102,14 +128,14 @@ Status show(const Arguments& arguments) {
   // Copied pixels are what can be made here without a renderer.
   output->give_up_scanout();
   const Image<Rgb16> picture = known_picture(mode.width, mode.height, kms->bits());
-  const Image<Rgb16> negative(mode.width, mode.height, Rgb16{3, 2, 1});
+  const Image<Rgb16> other(mode.width, mode.height, Rgb16{3, 2, 1});
   SteadyClock clock;
   const Time begin = clock.now();
   for (int i = 0; i < arguments.frames; ++i) {
     Frame frame;
     frame.number = static_cast<std::uint64_t>(i);
     frame.bits = kms->bits();
-    frame.codes = (i + 1 == arguments.frames ? picture : negative).view();
+    frame.codes = (i + 1 == arguments.frames ? picture : other).view();
     VENEER_TRY(output->present(frame));
     if (i == arguments.frames / 2) VENEER_TRY(output->blank());
   }
@@ -119,20 +145,7 @@ Status show(const Arguments& arguments) {
     return fail(Errc::kTimeout, "the last frame was handed over and never seen");
   if (seen->time < begin || seen->time > clock.now())
     return fail(Errc::kBadFormat, "the last frame was seen at a time that was not");
-  if (!arguments.png.empty()) {
-    if (kms->bits() == 8) {
-      Image<Rgb8> eight(mode.width, mode.height);
-      for (int y = 0; y < mode.height; ++y) {
-        for (int x = 0; x < mode.width; ++x) {
-          for (std::size_t c = 0; c < 3; ++c)
-            eight(x, y)[c] = static_cast<std::uint8_t>(picture(x, y)[c]);
-        }
-      }
-      VENEER_TRY(write_png(arguments.png, eight.view()));
-    } else {
-      VENEER_TRY(write_png(arguments.png, picture.view()));
-    }
-  }
+  VENEER_TRY(write(picture, kms->bits(), arguments.png));
   fmt::print("presented {} x {}, {} frames in {:.2f} s, {} waits\n",
              mode.width,
              mode.height,
