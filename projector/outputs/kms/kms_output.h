@@ -37,8 +37,8 @@ struct KmsOutputOptions {
 /// or by the next start. Frames go out at the vertical retrace, from three buffers.
 class KmsOutput final : public Output {
  public:
-  /// How long a frame may be on its way to the screen before the card counts as hung. Ten times
-  /// what the slowest change of modes was seen to take, and well under a watchdog's patience.
+  /// How long a frame may be on its way to the screen before the card counts as hung: dozens of
+  /// refreshes, and well under the ten seconds after which the kernel gives up itself.
   static constexpr Duration kFlipTimeout = std::chrono::seconds(1);
   /// Between two attempts to get a display back.
   static constexpr Duration kRetryPeriod = std::chrono::milliseconds(250);

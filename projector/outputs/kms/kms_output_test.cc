@@ -362,6 +362,23 @@ TEST_F(KmsOutputTest, AHungCardIsNoticedInTimeAndNeverWaitedForAgain) {
   EXPECT_EQ(output_->last_presented()->number, 0U);
 }
 
+TEST_F(KmsOutputTest, ACardThatWaitsForAnUnpluggedDisplayIsNotHung) {
+  ASSERT_TRUE(open());
+  ASSERT_TRUE(show(random_picture(1, 8)));
+  card_.hangs = true;
+  card_.connectors[0].connected = false;  // and no event of udev says so
+  const Status away = show(random_picture(2, 8));
+  ASSERT_FALSE(away);
+  EXPECT_EQ(away.error().code, Errc::kUnavailable);
+  card_.hangs = false;
+  card_.connectors[0].connected = true;
+  wait(KmsOutput::kRetryPeriod);
+  const Image<Rgb16> picture = random_picture(3, 8);
+  ASSERT_TRUE(show(picture));
+  ASSERT_TRUE(output_->finish());
+  EXPECT_TRUE(same(device_->screen(), picture));
+}
+
 TEST_F(KmsOutputTest, EveryRefusalIsExplained) {
   ASSERT_TRUE(open());
   const auto refused = [this](int error) {

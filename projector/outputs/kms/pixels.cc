@@ -14,38 +14,38 @@ namespace {
 template <int kChannelBits, class Widen>
 void write_row(const std::uint16_t* __restrict codes,
                std::size_t pixels,
-               std::uint32_t full,
+               std::uint16_t full,
                std::uint32_t* __restrict words,
                Widen widen) {
   for (std::size_t i = 0; i < pixels; ++i) {
-    const std::uint32_t red = widen(std::min<std::uint32_t>(codes[3 * i], full));
-    const std::uint32_t green = widen(std::min<std::uint32_t>(codes[3 * i + 1], full));
-    const std::uint32_t blue = widen(std::min<std::uint32_t>(codes[3 * i + 2], full));
+    const std::uint32_t red = widen(std::min(codes[3 * i], full));
+    const std::uint32_t green = widen(std::min(codes[3 * i + 1], full));
+    const std::uint32_t blue = widen(std::min(codes[3 * i + 2], full));
     words[i] = (red << (2U * kChannelBits)) | (green << unsigned{kChannelBits}) | blue;
   }
 }
 
 template <int kChannelBits>
 void write_all(ImageView<const Rgb16> codes, int bits, ImageView<std::uint32_t> words) {
-  const std::uint32_t full = (1U << static_cast<unsigned>(bits)) - 1;
+  const auto full = static_cast<std::uint16_t>((1U << static_cast<unsigned>(bits)) - 1);
   const auto rows = [&](auto widen) {
     for (int y = 0; y < codes.height(); ++y)
       write_row<kChannelBits>(
           codes.row(y).data()->data(), codes.row(y).size(), full, words.row(y).data(), widen);
   };
-  if (bits == kChannelBits) return rows([](std::uint32_t code) { return code; });
+  if (bits == kChannelBits) return rows([](std::uint16_t code) { return code; });
   if (bits == 8 && kChannelBits == 10) {
-    // 1023/255 is 4 + 3/255, so that only v/85, rounded, is left to add: 0 to 3, in steps that
-    // begin where v/85 passes 1/2, 3/2 and 5/2. Comparisons are done for many pixels at once.
-    return rows([](std::uint32_t code) {
-      return 4 * code + static_cast<std::uint32_t>(code >= 43) +
-             static_cast<std::uint32_t>(code >= 128) + static_cast<std::uint32_t>(code >= 213);
+    // 1023/255 is 4 + 3/255, so that v/85, rounded, is left to add; v + 42 over 85 is 193/16384 of
+    // it, cut off, for all codes, and stays in 16 bits: twice as many pixels at once.
+    return rows([](std::uint16_t code) {
+      const auto rest = static_cast<std::uint16_t>((code + 42U) * 193U);
+      return static_cast<std::uint16_t>(4U * code + (rest >> 14U));
     });
   }
   std::array<std::uint32_t, 1U << unsigned{kChannelBits}> table{};
   for (std::uint32_t code = 0; code <= full; ++code)
     table[code] = widen_code(code, bits, kChannelBits);
-  rows([&table](std::uint32_t code) { return table[code]; });
+  rows([&table](std::uint16_t code) { return table[code]; });
 }
 
 }  // namespace
