@@ -27,10 +27,19 @@ float projector_geometry(vec3 normal, vec3 position) {
 
 // The largest half float: brighter is drawn as this, not as infinity.
 const float kHalfMax = 65504.0;
+// Brighter than this is no light but a fault, as what is no number is.
+const float kFinite = 1e30;
 
 // What the draw passes leave: XYZ in cd/m^2, and in alpha the geometric factor; all 0 where the
-// surface faces away from the projector.
+// surface faces away from the projector. A fault stays one, so that it is found out and shown dark:
+// min() would make full white of what is no number.
 vec4 target_of(vec3 rgb, float geometry) {
-  return geometry > 0.0 ? min(vec4(mat3(frame.xyz_from_rgb) * rgb, geometry), vec4(kHalfMax))
-                        : vec4(0.0);
+  if (!(geometry > 0.0)) return vec4(0.0);
+  vec4 target = vec4(mat3(frame.xyz_from_rgb) * rgb, geometry);
+  bvec4 is_bright = greaterThan(target, vec4(kHalfMax));
+  bvec4 is_light = lessThan(target, vec4(kFinite));
+  for (int i = 0; i < 4; ++i) {
+    if (is_bright[i] && is_light[i]) target[i] = kHalfMax;
+  }
+  return target;
 }
