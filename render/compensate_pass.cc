@@ -257,7 +257,9 @@ Result<CompensatePass> CompensatePass::create(const PreparedProfile& profile, bo
 CompensatePass::~CompensatePass() {
   // Moved-from passes have no program, and their fences went along.
   if (count_program_.id() == 0) return;
-  for (const InFlight& slot : ring_) glDeleteSync(slot.fence);  // null is ignored
+  for (const InFlight& slot : ring_) {
+    if (slot.fence != nullptr) glDeleteSync(slot.fence);
+  }
 }
 
 void CompensatePass::compensate(const Bound& bound,

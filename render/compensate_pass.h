@@ -54,6 +54,7 @@ class CompensatePass {
   void run(GLuint target, std::uint32_t dither_seed);
   /// The framebuffer whose colour attachment (RGBA16UI) holds the codes of the last run.
   [[nodiscard]] GLuint framebuffer() const { return framebuffer_.id(); }
+  [[nodiscard]] GLuint codes() const { return codes_.id(); }
   /// Of the newest frame that the GPU is done with; never waits.
   [[nodiscard]] const Counts& counts();
 

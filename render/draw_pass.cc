@@ -218,9 +218,7 @@ void DrawPass::draw(GLuint framebuffer, const MeshBuffers& mesh, const DrawInput
     surface_->evaluate(framebuffer);
     return;
   }
-  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
-  glClearColor(0.0F, 0.0F, 0.0F, 0.0F);
-  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  clear(framebuffer);
   textures_.bind();
   if (cache_) {
     cache_->bind();
@@ -232,6 +230,13 @@ void DrawPass::draw(GLuint framebuffer, const MeshBuffers& mesh, const DrawInput
     use(program_.id());
     mesh.draw();
   }
+}
+
+void DrawPass::clear(GLuint framebuffer) const {
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+  glClearColor(0.0F, 0.0F, 0.0F, 0.0F);
+  glClearDepth(0.0);
+  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
 }
 
 void DrawPass::use(GLuint program) const {

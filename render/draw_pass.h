@@ -75,6 +75,8 @@ class DrawPass {
   /// Clears the framebuffer and draws. Sets all GL state that it needs. Evaluated in a compute
   /// pass, only its colour is written, and its depth stays as it was.
   void draw(GLuint framebuffer, const MeshBuffers& mesh, const DrawInput& input) const;
+  /// Clears the framebuffer alone: a frame in which nothing is covered.
+  void clear(GLuint framebuffer) const;
   /// Null where every pixel is drawn by itself.
   [[nodiscard]] const AngularCache* cache() const { return cache_ ? &*cache_ : nullptr; }
   /// Null where fragments are evaluated as they are drawn.

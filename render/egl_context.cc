@@ -12,6 +12,7 @@
 #include <map>
 #include <mutex>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace veneer::render {
@@ -35,29 +36,41 @@ bool lists(const char* extensions, std::string_view name) {
 
 std::string last_egl_error() { return fmt::format("EGL error {:#06x}", eglGetError()); }
 
-// An initialised display. EGL has one per platform and process, however often it is asked for, so
-// that contexts share it and the last one terminates it.
+// A hold on an initialised display. EGL has one per platform and process, however often it is asked
+// for, so that contexts share it and the last one terminates it: under the lock, or a display that
+// another thread has just been given would end under it.
 class Display {
  public:
-  static Result<std::shared_ptr<Display>> open(EGLDisplay handle) {
-    static std::mutex mutex;
-    static std::map<EGLDisplay, std::weak_ptr<Display>> displays;
-    const std::scoped_lock lock(mutex);
-    if (auto display = displays[handle].lock()) return display;
+  static Result<Display> open(EGLDisplay handle) {
+    Shared& shared = Display::shared();
+    const std::scoped_lock lock(shared.mutex);
     EGLint major = 0;
     EGLint minor = 0;
-    if (eglInitialize(handle, &major, &minor) != EGL_TRUE)
+    if (shared.holds[handle] == 0 && eglInitialize(handle, &major, &minor) != EGL_TRUE)
       return fail(Errc::kUnavailable, "cannot be initialised ({})", last_egl_error());
-    auto display = std::shared_ptr<Display>(new Display(handle));
-    displays[handle] = display;
-    return display;
+    ++shared.holds[handle];
+    return Display(handle);
   }
-  Display(const Display&) = delete;
-  Display& operator=(const Display&) = delete;
-  ~Display() { eglTerminate(handle_); }
+  Display(Display&& other) noexcept
+      : handle_(std::exchange(other.handle_, static_cast<EGLDisplay>(EGL_NO_DISPLAY))) {}
+  Display& operator=(Display&&) = delete;
+  ~Display() {
+    if (handle_ == EGL_NO_DISPLAY) return;
+    Shared& shared = Display::shared();
+    const std::scoped_lock lock(shared.mutex);
+    if (--shared.holds[handle_] == 0) eglTerminate(handle_);
+  }
   [[nodiscard]] EGLDisplay handle() const { return handle_; }
 
  private:
+  struct Shared {
+    std::mutex mutex;
+    std::map<EGLDisplay, int> holds;
+  };
+  static Shared& shared() {
+    static Shared the_one;
+    return the_one;
+  }
   explicit Display(EGLDisplay handle) : handle_(handle) {}
   EGLDisplay handle_;
 };
@@ -119,25 +132,27 @@ void APIENTRY report_gl_message(GLenum /*source*/,
 }  // namespace
 
 struct EglContext::State {
-  explicit State(std::shared_ptr<Display> the_display) : display(std::move(the_display)) {}
+  explicit State(Display the_display) : display(std::move(the_display)) {}
   State(const State&) = delete;
   State& operator=(const State&) = delete;
   ~State() {
     if (context == EGL_NO_CONTEXT) return;
     if (eglGetCurrentContext() == context)
-      eglMakeCurrent(display->handle(), EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
-    eglDestroyContext(display->handle(), context);
+      eglMakeCurrent(display.handle(), EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+    eglDestroyContext(display.handle(), context);
   }
 
-  std::shared_ptr<Display> display;  // shared by the contexts on it; the last one terminates it
+  Display display;
   EGLContext context = EGL_NO_CONTEXT;
+  bool reports_resets = false;
+  bool lost = false;
   std::string description;
 
   static Result<std::unique_ptr<State>> create(const Platform& platform) {
     const EGLDisplay handle = eglGetPlatformDisplayEXT(platform.kind, platform.native, nullptr);
     if (handle == EGL_NO_DISPLAY)
       return fail(Errc::kUnavailable, "has no display ({})", last_egl_error());
-    VENEER_ASSIGN(auto display, Display::open(handle));
+    VENEER_ASSIGN(Display display, Display::open(handle));
     const char* extensions = eglQueryString(handle, EGL_EXTENSIONS);
     for (const char* needed : {"EGL_KHR_surfaceless_context", "EGL_KHR_create_context"}) {
       if (!lists(extensions, needed)) return fail(Errc::kUnavailable, "lacks {}", needed);
@@ -154,25 +169,38 @@ struct EglContext::State {
       if (eglChooseConfig(handle, wanted.data(), &config, 1, &count) != EGL_TRUE || count == 0)
         return fail(Errc::kUnavailable, "has no configuration for OpenGL");
     }
-    const std::array<EGLint, 9> attributes{EGL_CONTEXT_MAJOR_VERSION_KHR,
-                                           4,
-                                           EGL_CONTEXT_MINOR_VERSION_KHR,
-                                           5,
-                                           EGL_CONTEXT_OPENGL_PROFILE_MASK_KHR,
-                                           EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT_KHR,
-                                           EGL_CONTEXT_FLAGS_KHR,
-                                           debugging() ? EGL_CONTEXT_OPENGL_DEBUG_BIT_KHR : 0,
-                                           EGL_NONE};
     auto state = std::make_unique<State>(std::move(display));
-    state->context = eglCreateContext(handle, config, EGL_NO_CONTEXT, attributes.data());
+    // A driver that cannot tell of resets refuses the first.
+    for (const bool robust : {true, false}) {
+      const std::array<EGLint, 11> attributes{
+          EGL_CONTEXT_MAJOR_VERSION_KHR,
+          4,
+          EGL_CONTEXT_MINOR_VERSION_KHR,
+          5,
+          EGL_CONTEXT_OPENGL_PROFILE_MASK_KHR,
+          EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT_KHR,
+          EGL_CONTEXT_FLAGS_KHR,
+          debugging() ? EGL_CONTEXT_OPENGL_DEBUG_BIT_KHR : 0,
+          robust ? EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY_KHR : EGL_NONE,
+          EGL_LOSE_CONTEXT_ON_RESET_KHR,
+          EGL_NONE};
+      state->context = eglCreateContext(handle, config, EGL_NO_CONTEXT, attributes.data());
+      if (state->context != EGL_NO_CONTEXT) break;
+    }
     if (state->context == EGL_NO_CONTEXT)
       return fail(Errc::kUnavailable, "gives no OpenGL 4.5 core context ({})", last_egl_error());
     if (eglMakeCurrent(handle, EGL_NO_SURFACE, EGL_NO_SURFACE, state->context) != EGL_TRUE)
       return fail(Errc::kUnavailable, "cannot be used without a surface ({})", last_egl_error());
-    state->description = fmt::format("{}, {}, through {}",
-                                     reinterpret_cast<const char*>(glGetString(GL_RENDERER)),
-                                     reinterpret_cast<const char*>(glGetString(GL_VERSION)),
-                                     platform.name);
+    // Some drivers take the wish and do not fulfil it; what counts is what the context says.
+    GLint strategy = GL_NO_RESET_NOTIFICATION;
+    glGetIntegerv(GL_RESET_NOTIFICATION_STRATEGY, &strategy);
+    state->reports_resets = strategy == GL_LOSE_CONTEXT_ON_RESET;
+    state->description =
+        fmt::format("{}, {}, through {}{}",
+                    reinterpret_cast<const char*>(glGetString(GL_RENDERER)),
+                    reinterpret_cast<const char*>(glGetString(GL_VERSION)),
+                    platform.name,
+                    state->reports_resets ? "" : ", which does not tell of resets");
     if (debugging()) {
       glEnable(GL_DEBUG_OUTPUT);
       glEnable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
@@ -186,13 +214,18 @@ EglContext::EglContext(std::unique_ptr<State> state) : state_(std::move(state)) 
 EglContext::EglContext(EglContext&&) noexcept = default;
 EglContext::~EglContext() = default;
 
-Result<EglContext> EglContext::create() {
+Status EglContext::find_library() {
   // libepoxy ends the program where it cannot load the library, so look first. It is never closed:
   // drivers do not survive being unloaded.
   static void* const library = dlopen("libEGL.so.1", RTLD_LAZY | RTLD_LOCAL);
   if (library == nullptr)
     return fail(
         Errc::kUnavailable, "making an OpenGL context: there is no libEGL.so.1; {}", kHowToGetOne);
+  return {};
+}
+
+Result<EglContext> EglContext::create() {
+  VENEER_TRY(find_library());
   std::string tried;
   for (const Platform& platform : platforms()) {
     auto state = State::create(platform);
@@ -208,17 +241,48 @@ Result<EglContext> EglContext::create() {
   return fail(Errc::kUnavailable, "making an OpenGL 4.5 context: {}; {}", tried, kHowToGetOne);
 }
 
+Result<EglContext> EglContext::create_on(void* gbm_device) {
+  VENEER_TRY(find_library());
+  const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
+  if (!lists(client, "EGL_KHR_platform_gbm") && !lists(client, "EGL_MESA_platform_gbm"))
+    return fail(Errc::kUnavailable,
+                "making an OpenGL context on the display's device: EGL has no GBM platform; {}",
+                kHowToGetOne);
+  auto state = State::create({"GBM", EGL_PLATFORM_GBM_KHR, gbm_device});
+  if (!state)
+    return fail(Errc::kUnavailable,
+                "making an OpenGL 4.5 context on the display's device: GBM {}; {}",
+                state.error().what,
+                kHowToGetOne);
+  return EglContext(std::move(*state));
+}
+
 void EglContext::make_current() const {
-  if (eglGetCurrentContext() == state_->context) return;
-  VENEER_CHECK(
-      eglMakeCurrent(state_->display->handle(), EGL_NO_SURFACE, EGL_NO_SURFACE, state_->context) ==
-      EGL_TRUE);
+  if (eglGetCurrentContext() == state_->context || state_->lost) return;
+  eglBindAPI(EGL_OPENGL_API);  // each thread has its own, and OpenGL ES at first
+  const EGLBoolean done =
+      eglMakeCurrent(state_->display.handle(), EGL_NO_SURFACE, EGL_NO_SURFACE, state_->context);
+  if (done == EGL_TRUE) return;
+  state_->lost = eglGetError() == EGL_CONTEXT_LOST;
+  VENEER_CHECK(state_->lost);  // or another thread still has it
+  // Nothing may go to a context that happened to be current.
+  eglMakeCurrent(state_->display.handle(), EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
 }
 
 void EglContext::release() const {
   if (eglGetCurrentContext() != state_->context) return;
-  eglMakeCurrent(state_->display->handle(), EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+  eglMakeCurrent(state_->display.handle(), EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
 }
+
+bool EglContext::lost() const {
+  if (state_->lost) return true;
+  make_current();
+  if (!state_->lost && state_->reports_resets)
+    state_->lost = glGetGraphicsResetStatus() != GL_NO_ERROR;
+  return state_->lost;
+}
+
+void* EglContext::display() const { return state_->display.handle(); }
 
 const std::string& EglContext::description() const { return state_->description; }
 

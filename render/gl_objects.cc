@@ -61,6 +61,12 @@ GlFramebuffer make_framebuffer() {
   return GlFramebuffer(id);
 }
 
+GlRenderbuffer make_renderbuffer() {
+  GLuint id = 0;
+  glCreateRenderbuffers(1, &id);
+  return GlRenderbuffer(id);
+}
+
 GlVertexArray make_vertex_array() {
   GLuint id = 0;
   glCreateVertexArrays(1, &id);

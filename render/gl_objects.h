@@ -16,8 +16,9 @@
 namespace veneer::render {
 
 /// Owns the name of a GL object; move-only. It remembers the context that it was made in, which
-/// must be current when it goes: only the render thread deletes. The context is therefore the first
-/// member of whoever owns both.
+/// must be current when it goes: only the thread that has the context deletes. The context is
+/// therefore the first member of whoever owns both. Of a lost context, which cannot be made
+/// current, nothing is left to delete.
 template <void (*kDelete)(GLuint)>
 class GlName {
  public:
@@ -40,8 +41,11 @@ class GlName {
 
  private:
   void reset() {
-    assert(id_ == 0 || eglGetCurrentContext() == owner_);
-    if (id_ != 0) kDelete(std::exchange(id_, 0));
+    if (id_ == 0) return;
+    const EGLContext current = eglGetCurrentContext();
+    assert(current == owner_ || current == EGL_NO_CONTEXT);
+    if (current == owner_) kDelete(id_);
+    id_ = 0;
   }
   GLuint id_ = 0;
   EGLContext owner_ = EGL_NO_CONTEXT;
@@ -50,6 +54,7 @@ class GlName {
 inline void delete_texture(GLuint id) { glDeleteTextures(1, &id); }
 inline void delete_buffer(GLuint id) { glDeleteBuffers(1, &id); }
 inline void delete_framebuffer(GLuint id) { glDeleteFramebuffers(1, &id); }
+inline void delete_renderbuffer(GLuint id) { glDeleteRenderbuffers(1, &id); }
 inline void delete_vertex_array(GLuint id) { glDeleteVertexArrays(1, &id); }
 inline void delete_query(GLuint id) { glDeleteQueries(1, &id); }
 inline void delete_program(GLuint id) { glDeleteProgram(id); }
@@ -58,6 +63,7 @@ inline void delete_shader(GLuint id) { glDeleteShader(id); }
 using GlTexture = GlName<&delete_texture>;
 using GlBuffer = GlName<&delete_buffer>;
 using GlFramebuffer = GlName<&delete_framebuffer>;
+using GlRenderbuffer = GlName<&delete_renderbuffer>;
 using GlVertexArray = GlName<&delete_vertex_array>;
 using GlQuery = GlName<&delete_query>;
 using GlProgram = GlName<&delete_program>;
@@ -68,6 +74,7 @@ using GlShader = GlName<&delete_shader>;
 /// An immutable buffer with these contents; `flags` as of glNamedBufferStorage.
 [[nodiscard]] GlBuffer make_buffer(const void* data, std::size_t bytes, GLbitfield flags);
 [[nodiscard]] GlFramebuffer make_framebuffer();
+[[nodiscard]] GlRenderbuffer make_renderbuffer();
 [[nodiscard]] GlVertexArray make_vertex_array();
 [[nodiscard]] GlQuery make_query(GLenum target);
 /// A 2D texture without mipmaps, nearest, clamped to the edge.

@@ -1,15 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/renderer.h"
 
+#include <optional>
+#include <utility>
+
 #include "render/compensate_pass.h"
 #include "render/draw_pass.h"
 #include "render/egl_context.h"
 #include "render/gpu_timer.h"
 #include "render/mesh_buffers.h"
 #include "render/prepared_profile.h"
+#include "render/scanout_buffers.h"
+#include "render/scanout_pass.h"
 
 namespace veneer::render {
 namespace {
+
+bool is_finite(const DirectionalLight& light) {
+  return light.direction_to_light.allFinite() && light.illuminance_rgb.allFinite();
+}
+bool is_finite(const PointLight& light) {
+  return light.position.allFinite() && light.intensity_rgb.allFinite();
+}
 
 Status check(const Scene& scene) {
   const Mesh& mesh = scene.mesh;
@@ -37,7 +49,25 @@ Status check(const Scene& scene) {
                     count);
     }
   }
+  for (const Light& light : scene.lights) {
+    const bool finite = std::visit([](const auto& l) { return is_finite(l); }, light);
+    if (!finite)
+      return fail(Errc::kBadFormat,
+                  "making a renderer: a light of the scene has a direction, a position or an "
+                  "intensity that is no number; correct the scene");
+  }
   return {};
+}
+
+// In single precision, as GL gets it.
+bool fits(const Eigen::Vector3d& v) { return v.cast<float>().allFinite(); }
+
+// Whether a frame can be drawn from it. What GL makes of vertices that are no numbers, and a
+// material of such an eye, is anybody's guess.
+bool is_sound(const FrameInput& input) {
+  return fits(input.eye_in_world) && fits(input.world_from_object.translation) &&
+         input.world_from_object.rotation.coeffs().cast<float>().allFinite() &&
+         input.specular_weight >= 0.0 && input.specular_weight <= 1.0;
 }
 
 class GlRenderer final : public Renderer {
@@ -46,7 +76,8 @@ class GlRenderer final : public Renderer {
                                                   const Scene& scene,
                                                   const btf::Material& material,
                                                   const PreparedProfile& prepared,
-                                                  const RendererOptions& options) {
+                                                  const RendererOptions& options,
+                                                  const Scanout* scanout) {
     const calibration::ProjectorProfile& profile = prepared.profile();
     const DrawOptions draw_options{.cache = options.cache,
                                    .filter = texel_filter(material, options.average_texels),
@@ -63,6 +94,7 @@ class GlRenderer final : public Renderer {
         GL_FRAMEBUFFER_COMPLETE)
       return fail(Errc::kUnavailable,
                   "making a renderer: this GL cannot draw to half floats with depth");
+    if (scanout != nullptr) VENEER_TRY(renderer->import(*scanout));
     return renderer;
   }
 
@@ -70,12 +102,18 @@ class GlRenderer final : public Renderer {
 
   void release() override { context_.release(); }
 
-  bool lost() override {
-    context_.make_current();
-    return glGetGraphicsResetStatus() != GL_NO_ERROR;
-  }
+  bool lost() override { return context_.lost(); }
 
-  void draw_to_scanout(std::size_t /*buffer*/) override { VENEER_CHECK(false); }
+  void draw_to_scanout(std::size_t buffer) override {
+    VENEER_CHECK(scanout_pass_ && buffer < scanout_buffers_.size());
+    context_.make_current();
+    scanout_pass_->run(compensate_.codes(),
+                       scanout_buffers_.framebuffer(buffer),
+                       scanout_buffers_.bits(buffer),
+                       width_,
+                       height_);
+    glFlush();
+  }
 
   Status set_profile(const PreparedProfile& prepared) override {
     VENEER_TRY(check_exchangeable({width_, height_, bits_}, prepared.profile()));
@@ -86,12 +124,16 @@ class GlRenderer final : public Renderer {
   }
 
   void draw(const FrameInput& input) override {
-    VENEER_CHECK(input.specular_weight >= 0.0 && input.specular_weight <= 1.0);
     context_.make_current();
     timer_.begin();
-    draw_.draw(target_framebuffer_.id(),
-               mesh_,
-               {input.eye_in_world, input.world_from_object, input.specular_weight});
+    if (is_sound(input)) {
+      draw_.draw(target_framebuffer_.id(),
+                 mesh_,
+                 {input.eye_in_world, input.world_from_object, input.specular_weight});
+    } else {
+      draw_.clear(target_framebuffer_.id());
+    }
+    timer_.split();
     compensate_.run(target_.id(), input.dither_seed);
     timer_.end();
     glFlush();
@@ -121,7 +163,10 @@ class GlRenderer final : public Renderer {
     statistics.out_of_reach_pixels = counts.out_of_reach;
     if (counts.covered > 0)
       statistics.gamut_loss_mean = counts.gamut_loss / static_cast<double>(counts.covered);
-    statistics.gpu_ms = timer_.milliseconds();
+    if (const auto times = timer_.times()) {
+      statistics.gpu_ms = times->all_ms;
+      statistics.draw_ms = times->first_ms;
+    }
     return statistics;
   }
 
@@ -147,6 +192,13 @@ class GlRenderer final : public Renderer {
     glNamedFramebufferTexture(target_framebuffer_.id(), GL_DEPTH_ATTACHMENT, depth_.id(), 0);
   }
 
+  Status import(const Scanout& scanout) {
+    VENEER_ASSIGN(scanout_pass_, ScanoutPass::create(bits_));
+    VENEER_ASSIGN(scanout_buffers_,
+                  ScanoutBuffers::import(context_, scanout.buffers, {width_, height_, bits_}));
+    return {};
+  }
+
   // Rows come as they lie in the framebuffer, whose row 0 is the raster's first
   // (clip_from_projector).
   template <class Pixel>
@@ -170,6 +222,8 @@ class GlRenderer final : public Renderer {
   DrawPass draw_;
   CompensatePass compensate_;
   GpuTimer timer_;
+  ScanoutBuffers scanout_buffers_;
+  std::optional<ScanoutPass> scanout_pass_;  // where there are buffers
 };
 
 }  // namespace
@@ -178,12 +232,19 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const Scene& scene,
                                                    const btf::Material& material,
                                                    const calibration::ProjectorProfile& profile,
                                                    const RendererOptions& options,
-                                                   const Scanout* /*scanout*/) {
+                                                   const Scanout* scanout) {
   VENEER_TRY(check(scene));
   auto prepared = PreparedProfile::prepare(profile, options);
   if (!prepared) return fail_while("making a renderer", prepared.error());
-  VENEER_ASSIGN(EglContext context, EglContext::create());
-  return GlRenderer::create(std::move(context), scene, material, *prepared, options);
+  if (scanout != nullptr && scanout->gbm_device == nullptr)
+    return fail(
+        Errc::kUnavailable,
+        "making a renderer: the display has no GBM device, of which EGL could draw into its "
+        "buffers");
+  VENEER_ASSIGN(
+      EglContext context,
+      scanout != nullptr ? EglContext::create_on(scanout->gbm_device) : EglContext::create());
+  return GlRenderer::create(std::move(context), scene, material, *prepared, options, scanout);
 }
 
 }  // namespace veneer::render

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <set>
@@ -502,6 +503,7 @@ TEST_F(RendererTest, TimesFramesWithoutWaiting) {
                           "return x;"));
   EXPECT_FALSE(renderer->statistics().gpu_ms.has_value());
   std::vector<double> clock_ms;
+  std::vector<double> drawn;  // the draw pass's part of the GPU's time
   for (int i = 0; i < 10; ++i) {
     const auto start = std::chrono::steady_clock::now();
     renderer->draw(tilted_frame());
@@ -509,12 +511,76 @@ TEST_F(RendererTest, TimesFramesWithoutWaiting) {
     clock_ms.push_back(
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
             .count());
+    const FrameStatistics statistics = renderer->statistics();
+    ASSERT_TRUE(statistics.gpu_ms && statistics.draw_ms);
+    EXPECT_GT(*statistics.draw_ms, 0.0);
+    EXPECT_LT(*statistics.draw_ms, *statistics.gpu_ms);
+    drawn.push_back(*statistics.draw_ms / *statistics.gpu_ms);
   }
   const auto gpu_ms = renderer->statistics().gpu_ms;
   ASSERT_TRUE(gpu_ms.has_value());
   // The GPU's share of the last frame: most of it, and no more than all.
   EXPECT_GT(*gpu_ms, 0.3 * clock_ms.back());
   EXPECT_LT(*gpu_ms, 1.05 * clock_ms.back());
+  // Nearly all of it is the draw pass; the median, as a busy machine stretches any part.
+  std::sort(drawn.begin(), drawn.end());
+  EXPECT_GT(drawn[drawn.size() / 2], 0.7);
+}
+
+// On any doubt dark: a frame whose input is no number shows nothing, and the next one is as ever.
+TEST_F(RendererTest, WhatIsNoNumberIsDark) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInf = std::numeric_limits<double>::infinity();
+  constexpr double kTooLarge = 1e300;  // for single precision
+  // A material that would hide a bad eye: it is white whatever the view is.
+  const ShaderMaterial white("return vec3(4.0 + 0.0 * clamp(view.x, 0.0, 1.0));");
+  for (const Evaluation evaluation : {Evaluation::kFragment, Evaluation::kCompute}) {
+    const auto renderer = make(plate_scene(), white, {.evaluation = evaluation});
+    const auto codes = [&](const FrameInput& input) {
+      renderer->draw(input);
+      Image<Rgb16> image(kWidth, kHeight);
+      renderer->read_codes(image.view());
+      const auto pixels = image.pixels();
+      return std::vector<Rgb16>(pixels.begin(), pixels.end());
+    };
+    const std::vector<Rgb16> dark(kWidth * kHeight, Rgb16{});
+    const std::vector<Rgb16> sound = codes(tilted_frame());
+    ASSERT_NE(sound, dark);
+    for (const double bad : {kNan, kInf, -kInf, kTooLarge}) {
+      std::vector<FrameInput> inputs(5, tilted_frame());
+      inputs[0].eye_in_world.y() = bad;
+      inputs[1].world_from_object.translation.x() = bad;
+      inputs[2].world_from_object.rotation.w() = bad;
+      inputs[3].world_from_object.rotation.z() = bad;
+      inputs[4].specular_weight = bad;
+      for (std::size_t i = 0; i < inputs.size(); ++i) {
+        EXPECT_EQ(codes(inputs[i]), dark) << "input " << i << ": " << bad;
+        EXPECT_EQ(codes(tilted_frame()), sound) << "after input " << i << ": " << bad;
+      }
+    }
+    for (const double weight : {-1e-9, 1.0 + 1e-9}) {
+      FrameInput input = tilted_frame();
+      input.specular_weight = weight;
+      EXPECT_EQ(codes(input), dark) << weight;
+    }
+  }
+  // A target that is no number is out of reach.
+  for (const char* body : {"return vec3(sqrt(-view.z));",
+                           "return vec3(1.0 / min(view.z, 0.0));",
+                           "return vec3(1.0, sqrt(-view.z), 1.0);",
+                           "return vec3(1e38) * 1e38;"}) {
+    const auto renderer = make(plate_scene(), ShaderMaterial(body));
+    renderer->draw(tilted_frame());
+    Image<Rgb16> image(kWidth, kHeight);
+    renderer->read_codes(image.view());
+    Image<Rgb32f> target(kWidth, kHeight);
+    renderer->read_target(target.view());
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x)
+        ASSERT_EQ(image(x, y), Rgb16{}) << body << ": " << target(x, y).transpose();
+    renderer->finish();
+    EXPECT_GT(renderer->statistics().out_of_reach_pixels, 500U) << body;
+  }
 }
 
 TEST_F(RendererTest, RefusesWhatItCannotDraw) {
@@ -537,6 +603,15 @@ TEST_F(RendererTest, RefusesWhatItCannotDraw) {
   EXPECT_NE(refused(bare, white, {}).find("texture coordinates"), std::string::npos);
   EXPECT_NE(refused(plate_scene(), ShaderMaterial("return nonsense;"), {}).find("nonsense"),
             std::string::npos);
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  for (const Light& light : {Light(DirectionalLight{{0, kNan, 1}, {1, 1, 1}}),
+                             Light(DirectionalLight{{0, 0, 1}, {1, kNan, 1}}),
+                             Light(PointLight{{kNan, 0, 1}, {1, 1, 1}}),
+                             Light(PointLight{{0, 0, 1}, {1, 1, HUGE_VAL}})}) {
+    Scene blinding = plate_scene();
+    blinding.lights.push_back(light);
+    EXPECT_NE(refused(blinding, white, {}).find("no number"), std::string::npos);
+  }
   profile_.primaries.col(0).setZero();
   EXPECT_NE(refused(plate_scene(), white, {}), "");
 }

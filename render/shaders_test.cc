@@ -4,6 +4,7 @@
 #include "render/compensate_pass.h"
 #include "render/draw_pass.h"
 #include "render/internal_glslang.h"
+#include "render/scanout_pass.h"
 
 namespace veneer::render {
 namespace {
@@ -18,6 +19,7 @@ TEST(Shaders, AreValidByTheReferenceCompiler) {
     EXPECT_EQ(glslang_complaints(compensate_fragment_source(kind), "frag"), "");
   EXPECT_EQ(glslang_complaints(fullscreen_vertex_source(), "vert"), "");
   EXPECT_EQ(glslang_complaints(count_compute_source(), "comp"), "");
+  EXPECT_EQ(glslang_complaints(scanout_fragment_source(), "frag"), "");
   EXPECT_EQ(glslang_complaints(plain_fragment_source(), "frag"), "");
   for (const int lights : {1, kMaxLights}) {
     EXPECT_EQ(glslang_complaints(draw_vertex_source(lights), "vert"), "");
