@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/compensate_pass.h"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 #include <vector>
@@ -22,8 +23,8 @@ constexpr std::string_view kVersion = "#version 450 core\n";
 constexpr int kGroupWidth = 128;
 constexpr int kGroupHeight = 64;
 constexpr int kLevelsWidth = 1024;        // of the texture of levels
-constexpr std::size_t kCounterCount = 5;  // of the block Counters
-constexpr double kLossUnit = 1.0 / 64.0;  // of the loss in the codes' alpha
+constexpr std::size_t kCounterCount = 6;  // of the block Counters
+constexpr double kLossUnit = 1.0 / 32.0;  // of the loss in the codes' alpha
 
 // The block Compensation of compensate.frag.
 struct ConstantsBlock {
@@ -42,8 +43,13 @@ struct ConstantsBlock {
   std::int32_t gamut_steps;
   Eigen::Vector4f correction_full;
   Eigen::Vector4i correction_axes;
+  Eigen::Vector4f nits;
+  float ceiling_limit;
+  std::int32_t ceiling_steps;
+  std::int32_t code_count;
+  std::int32_t last_residual_node;
 };
-static_assert(sizeof(ConstantsBlock) == 4 * 64 + 8 * 16);
+static_assert(sizeof(ConstantsBlock) == 4 * 64 + 10 * 16);
 
 Eigen::Matrix4f padded(const Eigen::Matrix3d& m) {
   Eigen::Matrix4f result = Eigen::Matrix4f::Identity();
@@ -80,6 +86,13 @@ ConstantsBlock block_of(const Compensation& compensation) {
   const calibration::DriveCorrection::Axes& axes = correction.axes();
   block.correction_full = padded(axes.full);
   block.correction_axes = {axes.steps, axes.below, correction.nodes() - 1, 0};
+  const LuminanceCeiling& ceiling = compensation.ceiling();
+  block.nits = padded(ceiling.primaries_nits());
+  block.nits.w() = static_cast<float>(ceiling.black_nits());
+  block.ceiling_limit = static_cast<float>(ceiling.limit());
+  block.ceiling_steps = kCeilingSteps;
+  block.code_count = static_cast<std::int32_t>(ceiling.tone_curves()[0].size());
+  block.last_residual_node = std::max(ceiling.residual().nodes() - 1, 0);
   return block;
 }
 
@@ -101,35 +114,53 @@ GlTexture upload_seeds(const Compensation& compensation) {
   return texture;
 }
 
-// The levels of all channels one after the other, in rows of kLevelsWidth.
+// A list in rows of kLevelsWidth, with room for every code of three channels, so that its size
+// depends on the bits alone (see warm_up()).
+template <class Texel>
+GlTexture upload_rows(GLenum internal_format, GLenum format, int bits, std::vector<Texel> texels) {
+  const int rows = ((3 << bits) + kLevelsWidth - 1) / kLevelsWidth;
+  texels.resize(static_cast<std::size_t>(rows) * kLevelsWidth);
+  GlTexture texture = make_texture_2d(internal_format, kLevelsWidth, rows);
+  glTextureSubImage2D(texture.id(), 0, 0, 0, kLevelsWidth, rows, format, GL_FLOAT, texels.data());
+  return texture;
+}
+
+// The levels of all channels one after the other.
 GlTexture upload_levels(const PreparedProfile& profile) {
   std::vector<std::array<float, 2>> texels;
   for (const ToneLevels& tone : profile.compensation().tone_levels()) {
     for (std::size_t i = 0; i < tone.levels().size(); ++i)
       texels.push_back({tone.levels()[i], static_cast<float>(tone.codes()[i])});
   }
-  // Room for every code, so that the texture's size depends on the bits alone (see warm_up()).
-  const int codes = 3 << profile.profile().bits;
-  const int rows = (codes + kLevelsWidth - 1) / kLevelsWidth;
-  texels.resize(static_cast<std::size_t>(rows) * kLevelsWidth);
-  GlTexture texture = make_texture_2d(GL_RG32F, kLevelsWidth, rows);
-  glTextureSubImage2D(texture.id(), 0, 0, 0, kLevelsWidth, rows, GL_RG, GL_FLOAT, texels.data());
-  return texture;
+  return upload_rows(GL_RG32F, GL_RG, profile.profile().bits, std::move(texels));
 }
 
-// The correction of every node; alpha is padding.
-GlTexture upload_correction(const calibration::DriveCorrection& correction) {
-  if (correction.empty()) return {};
+// What every code sends, channels one after the other; none without a ceiling.
+GlTexture upload_light(const PreparedProfile& profile) {
+  const LuminanceCeiling& ceiling = profile.compensation().ceiling();
+  if (!ceiling.active()) return {};
+  std::vector<float> texels;
+  for (const std::vector<double>& curve : ceiling.tone_curves())
+    texels.insert(texels.end(), curve.begin(), curve.end());
+  return upload_rows(GL_R32F, GL_RED, profile.profile().bits, std::move(texels));
+}
+
+// A table over a cube, along each axis `nodes`; alpha is padding.
+GlTexture upload_cube(int nodes, const std::vector<Eigen::Vector3d>& values) {
+  if (values.empty()) return {};
   std::vector<Eigen::Vector4f> texels;
-  texels.reserve(correction.values().size());
-  for (const Eigen::Vector3d& value : correction.values()) texels.push_back(padded(value));
-  const int n = correction.nodes();
+  texels.reserve(values.size());
+  for (const Eigen::Vector3d& value : values) texels.push_back(padded(value));
   GlTexture texture = make_texture(GL_TEXTURE_3D);
-  glTextureStorage3D(texture.id(), 1, GL_RGBA32F, n, n, n);
+  glTextureStorage3D(texture.id(), 1, GL_RGBA32F, nodes, nodes, nodes);
   glTextureParameteri(texture.id(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
   glTextureParameteri(texture.id(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-  glTextureSubImage3D(texture.id(), 0, 0, 0, 0, n, n, n, GL_RGBA, GL_FLOAT, texels.data()->data());
+  glTextureSubImage3D(
+      texture.id(), 0, 0, 0, 0, nodes, nodes, nodes, GL_RGBA, GL_FLOAT, texels.data()->data());
   return texture;
+}
+GlTexture upload_correction(const calibration::DriveCorrection& correction) {
+  return upload_cube(correction.nodes(), correction.values());
 }
 
 CompensateKind kind_of(const Compensation& compensation) {
@@ -157,13 +188,14 @@ GLsizei groups(int pixels, int per_group) { return (pixels + per_group - 1) / pe
 
 }  // namespace
 
-std::string compensate_fragment_source(CompensateKind kind) {
-  return fmt::format("{}#define SEED_COUNT {}\n#define LEVELS_WIDTH {}\n{}{}{}",
+std::string compensate_fragment_source(CompensateKind kind, bool has_ceiling) {
+  return fmt::format("{}#define SEED_COUNT {}\n#define LEVELS_WIDTH {}\n{}{}{}{}",
                      kVersion,
                      ToneLevels::kSeeds,
                      kLevelsWidth,
                      kind != CompensateKind::kNone ? "#define COMPENSATE\n" : "",
                      kind == CompensateKind::kResidual ? "#define RESIDUAL\n" : "",
+                     has_ceiling ? "#define CEILING\n" : "",
                      kCompensateFrag);
 }
 std::string fullscreen_vertex_source() { return std::string(kVersion) + kFullscreenVert; }
@@ -172,10 +204,11 @@ std::string count_compute_source() { return std::string(kVersion) + kCountComp; 
 Status CompensatePass::link(CompensateKind kind) {
   Program& program = programs_[static_cast<std::size_t>(kind)];
   if (program.program.id() != 0) return {};
-  VENEER_ASSIGN(
-      program.program,
-      link_program({{GL_VERTEX_SHADER, "fullscreen.vert", fullscreen_vertex_source()},
-                    {GL_FRAGMENT_SHADER, "compensate.frag", compensate_fragment_source(kind)}}));
+  VENEER_ASSIGN(program.program,
+                link_program({{GL_VERTEX_SHADER, "fullscreen.vert", fullscreen_vertex_source()},
+                              {GL_FRAGMENT_SHADER,
+                               "compensate.frag",
+                               compensate_fragment_source(kind, has_ceiling_)}}));
   program.seed_location = glGetUniformLocation(program.program.id(), "dither_seed");
   return {};
 }
@@ -192,8 +225,9 @@ Status CompensatePass::warm_up() {
       calibration::ColourResidual::sampled(2, nothing), calibration::DriveCorrection::kNodes));
   for (const CompensateKind kind : {CompensateKind::kPlain, CompensateKind::kResidual}) {
     VENEER_TRY(link(kind));
+    const GLuint residual = kind == CompensateKind::kResidual ? correction.id() : 0;
     for (const GLuint reflectance : {even.id(), patterned.id()})
-      compensate({kind, target.id(), reflectance, correction.id()}, 0, 1, 1);
+      compensate({kind, target.id(), reflectance, correction.id(), residual}, 0, 1, 1);
   }
   glFinish();
   return {};
@@ -207,13 +241,17 @@ CompensatePass::ProfileTextures CompensatePass::upload(const PreparedProfile& pr
           upload_levels(profile),
           upload_image(GL_R32F, GL_RED, profile.vignetting()),
           upload_image(GL_RGB32F, GL_RGB, profile.reflectance()),
-          upload_correction(compensation.correction())};
+          upload_correction(compensation.correction()),
+          upload_light(profile),
+          upload_cube(compensation.ceiling().residual().nodes(),
+                      compensation.ceiling().residual().values())};
 }
 
 Status CompensatePass::set_profile(const PreparedProfile& profile) {
   VENEER_CHECK(profile.vignetting().width() == width_ && profile.vignetting().height() == height_);
   const CompensateKind kind = kind_of(profile.compensation());
   VENEER_CHECK((kind == CompensateKind::kNone) == (kind_ == CompensateKind::kNone));
+  VENEER_CHECK(profile.compensation().ceiling().active() == has_ceiling_);
   VENEER_TRY(link(kind));
   profile_ = upload(profile);
   kind_ = kind;
@@ -225,6 +263,7 @@ Result<CompensatePass> CompensatePass::create(const PreparedProfile& profile, bo
   pass.width_ = profile.vignetting().width();
   pass.height_ = profile.vignetting().height();
   pass.kind_ = kind_of(profile.compensation());
+  pass.has_ceiling_ = profile.compensation().ceiling().active();
   VENEER_TRY(pass.link(pass.kind_));
   VENEER_ASSIGN(pass.count_program_,
                 link_program({{GL_COMPUTE_SHADER, "count.comp", count_compute_source()}}));
@@ -280,15 +319,20 @@ void CompensatePass::compensate(const Bound& bound,
   glBindTextureUnit(3, profile_.levels.id());
   glBindTextureUnit(4, bound.reflectance);
   if (bound.kind == CompensateKind::kResidual) glBindTextureUnit(5, bound.correction);
+  if (has_ceiling_) {
+    glBindTextureUnit(6, profile_.light.id());
+    glBindTextureUnit(7, bound.residual);
+  }
   glBindVertexArray(no_vertices_.id());
   glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
 void CompensatePass::run(GLuint target, std::uint32_t dither_seed) {
-  compensate({kind_, target, profile_.reflectance.id(), profile_.correction.id()},
-             dither_seed,
-             width_,
-             height_);
+  compensate(
+      {kind_, target, profile_.reflectance.id(), profile_.correction.id(), profile_.residual.id()},
+      dither_seed,
+      width_,
+      height_);
 
   const std::size_t index = frame_ % kRing;
   InFlight& slot = ring_[index];
@@ -317,8 +361,11 @@ const CompensatePass::Counts& CompensatePass::counts() {
     if (slot.number < newest_counted_) continue;
     newest_counted_ = slot.number;
     const std::uint64_t loss = slot.mapped[3] | static_cast<std::uint64_t>(slot.mapped[4]) << 32U;
-    counts_ = {
-        slot.mapped[0], slot.mapped[1], slot.mapped[2], static_cast<double>(loss) * kLossUnit};
+    counts_ = {.covered = slot.mapped[0],
+               .out_of_gamut = slot.mapped[1],
+               .out_of_reach = slot.mapped[2],
+               .held = slot.mapped[5],
+               .gamut_loss = static_cast<double>(loss) * kLossUnit};
   }
   return counts_;
 }

@@ -21,7 +21,9 @@ enum class CompensateKind {
   kResidual,  ///< with the profile's colour residual
 };
 /// The complete source of the compensate pass.
-[[nodiscard]] std::string compensate_fragment_source(CompensateKind kind);
+/// @param has_ceiling  with RendererOptions::luminance_ceiling; a program of its own, so that it
+///                     costs nothing where there is none.
+[[nodiscard]] std::string compensate_fragment_source(CompensateKind kind, bool has_ceiling = false);
 /// The complete sources of the pass's other stages.
 [[nodiscard]] std::string fullscreen_vertex_source();
 [[nodiscard]] std::string count_compute_source();
@@ -35,6 +37,7 @@ class CompensatePass {
     std::uint64_t covered = 0;
     std::uint64_t out_of_gamut = 0;
     std::uint64_t out_of_reach = 0;
+    std::uint64_t held = 0;
     double gamut_loss = 0;  ///< sum over the pixels
   };
 
@@ -79,6 +82,8 @@ class CompensatePass {
     GlTexture vignetting;
     GlTexture reflectance;
     GlTexture correction;  // none without a residual
+    GlTexture light;       // none without a ceiling
+    GlTexture residual;    // none without both
   };
   CompensatePass() = default;
   [[nodiscard]] Status link(CompensateKind kind);
@@ -90,11 +95,13 @@ class CompensatePass {
     GLuint target;
     GLuint reflectance;
     GLuint correction;
+    GLuint residual;
   };
   void compensate(const Bound& bound, std::uint32_t dither_seed, int width, int height);
 
   std::array<Program, 3> programs_;  // indexed by CompensateKind
   CompensateKind kind_ = CompensateKind::kPlain;
+  bool has_ceiling_ = false;
   ProfileTextures profile_;
   GlProgram count_program_;
   GlBuffer counters_;  // kRing slots, mapped for good

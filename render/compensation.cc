@@ -60,6 +60,21 @@ Compensation::Constants constants_of(const calibration::ProjectorProfile& profil
   return c;
 }
 
+using Codes = std::array<std::uint16_t, 3>;
+
+Codes chosen(const std::array<ToneLevels::Bracket, 3>& brackets, const Vector3d& thresholds) {
+  Codes codes{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const ToneLevels::Bracket& b = brackets[i];
+    codes[i] = b.fraction > thresholds[static_cast<Eigen::Index>(i)] ? b.upper : b.lower;
+  }
+  return codes;
+}
+// The highest that any threshold chooses.
+Codes highest(const std::array<ToneLevels::Bracket, 3>& brackets) {
+  return chosen(brackets, Vector3d::Zero());
+}
+
 bool is_inside(const Vector3d& drive, double tolerance) {
   return drive.minCoeff() >= -tolerance && drive.maxCoeff() <= 1.0 + tolerance;
 }
@@ -69,6 +84,7 @@ bool is_inside(const Vector3d& drive, double tolerance) {
 Compensation::Compensation(const calibration::ProjectorProfile& profile,
                            const RendererOptions& options)
     : constants_(constants_of(profile, options)),
+      ceiling_(profile, options.luminance_ceiling),
       correction_(options.compensate ? calibration::DriveCorrection(profile.residual)
                                      : calibration::DriveCorrection()),
       tone_levels_(levels_of(profile, options.compensate)) {}
@@ -138,6 +154,33 @@ void Compensation::map_to_gamut(const Xyz& target,
   pixel.gamut_loss = 100.0 * (1.0 - kept) * way.norm();
 }
 
+Compensation::Brackets Compensation::brackets(const Vector3d& drive) const {
+  return {tone_levels_[0].bracket(drive[0]),
+          tone_levels_[1].bracket(drive[1]),
+          tone_levels_[2].bracket(drive[2])};
+}
+
+void Compensation::hold(const Vector3d& thresholds, CompensatedPixel& pixel) const {
+  const Codes before = highest(brackets(pixel.drive));
+  if (ceiling_.allows(before)) return;
+  pixel.held = before != Codes{};  // what is off cannot be brought down
+  // In proportion to the light, which with a residual the drive is not.
+  const Vector3d sent =
+      correction_.empty() ? pixel.drive : Vector3d(pixel.drive + ceiling_.residual()(pixel.drive));
+  const auto scaled = [&](double root) -> Vector3d {
+    return correction_(root * root * sent).cwiseMax(0.0).cwiseMin(1.0);
+  };
+  double root = 0.0;
+  double step = 0.5;
+  for (int i = 0; i < kCeilingSteps; ++i, step *= 0.5) {
+    if (ceiling_.allows(highest(brackets(scaled(root + step))))) root += step;
+  }
+  pixel.drive = root > 0.0 ? scaled(root) : Vector3d::Zero();
+  const Brackets under = brackets(pixel.drive);
+  pixel.codes = chosen(under, thresholds);
+  if (!ceiling_.allows(pixel.codes)) pixel.codes = highest(under);
+}
+
 CompensatedPixel Compensation::pixel(const Xyz& target,
                                      double geometry,
                                      double vignetting,
@@ -163,11 +206,12 @@ CompensatedPixel Compensation::pixel(const Xyz& target,
     if (constants_.compensate) map_to_gamut(target, wanted_drive, g, s, result);
   }
   result.drive = result.drive.cwiseMax(0.0).cwiseMin(1.0);
-  for (std::uint32_t i = 0; i < 3; ++i) {
-    const ToneLevels::Bracket bracket = tone_levels_[i].bracket(result.drive[i]);
-    const double threshold = constants_.dither ? dither_threshold(x, y, i, dither_seed) : 0.5;
-    result.codes[i] = bracket.fraction > threshold ? bracket.upper : bracket.lower;
+  Vector3d thresholds = Vector3d::Constant(0.5);
+  if (constants_.dither) {
+    for (std::uint32_t i = 0; i < 3; ++i) thresholds[i] = dither_threshold(x, y, i, dither_seed);
   }
+  result.codes = chosen(brackets(result.drive), thresholds);
+  if (ceiling_.active()) hold(thresholds, result);
   return result;
 }
 

@@ -9,6 +9,7 @@
 #include "base/colour.h"
 #include "calibration/drive_correction.h"
 #include "calibration/profile.h"
+#include "render/luminance_ceiling.h"
 #include "render/renderer.h"
 #include "render/tone_levels.h"
 
@@ -26,6 +27,7 @@ struct CompensatedPixel {
   PixelState state = PixelState::kNotCovered;
   Eigen::Vector3d drive = Eigen::Vector3d::Zero();  ///< t (tau), linear, in [0, 1]
   double gamut_loss = 0;                            ///< dE in IPT x 100 that gamut mapping made
+  bool held = false;                                ///< brought down to the luminance ceiling
   std::array<std::uint16_t, 3> codes{};
 };
 
@@ -55,6 +57,13 @@ inline constexpr int kGamutSteps = 12;
 /// drive without black,
 /// cut to [0, 1], and the codes are its sRGB encoding: what is shown by someone who knows nothing
 /// of the projector or the surface.
+///
+/// With RendererOptions::luminance_ceiling, what has gone through all this is held under it: where
+/// the upper of the bracketing codes send too much, all that is sent above black is scaled down by
+/// one factor, so that its hue stays, until they do not; dither then chooses as ever. Where even
+/// the least that is not black is too much, all is off. That the codes are allowed is asked last of
+/// all, of the codes themselves; should dither have mixed a pair that a residual makes brighter
+/// than the upper codes, those are taken.
 ///
 /// A target or geometry that is not finite, and G below the floor, are out of reach: drive 0.
 class Compensation {
@@ -88,6 +97,7 @@ class Compensation {
     Eigen::Vector3d drive_of_white;  ///< M^-1 A^-1 W
   };
   [[nodiscard]] const Constants& constants() const { return constants_; }
+  [[nodiscard]] const LuminanceCeiling& ceiling() const { return ceiling_; }
   /// Empty without a residual, or without compensation.
   [[nodiscard]] const calibration::DriveCorrection& correction() const { return correction_; }
   [[nodiscard]] const std::array<ToneLevels, 3>& tone_levels() const { return tone_levels_; }
@@ -98,7 +108,11 @@ class Compensation {
                     double g,
                     const Eigen::Vector3d& reflectance,
                     CompensatedPixel& pixel) const;
+  using Brackets = std::array<ToneLevels::Bracket, 3>;
+  [[nodiscard]] Brackets brackets(const Eigen::Vector3d& drive) const;
+  void hold(const Eigen::Vector3d& thresholds, CompensatedPixel& pixel) const;
   Constants constants_;
+  LuminanceCeiling ceiling_;
   calibration::DriveCorrection correction_;
   std::array<ToneLevels, 3> tone_levels_;
 };

@@ -21,6 +21,12 @@ Result<PreparedProfile> PreparedProfile::prepare(calibration::ProjectorProfile p
     return fail(Errc::kInvalidOption,
                 "preparing a profile: geometry_floor is {}; it must be above 0",
                 options.geometry_floor);
+  if (!(options.luminance_ceiling >= 0.0) || !std::isfinite(options.luminance_ceiling))
+    return fail(
+        Errc::kInvalidOption,
+        "preparing a profile: luminance_ceiling is {} cd/m^2; it must be a number above 0, or "
+        "0 for none",
+        options.luminance_ceiling);
   VENEER_TRY(profile.check());
   const Xyz white = profile.white();
   if (!((cones_from_xyz() * white).minCoeff() > 0.0))

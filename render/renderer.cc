@@ -89,7 +89,7 @@ class GlRenderer final : public Renderer {
     VENEER_ASSIGN(CompensatePass compensate,
                   CompensatePass::create(prepared, options.exchangeable));
     auto renderer = std::unique_ptr<GlRenderer>(new GlRenderer(
-        std::move(context), scene.mesh, profile, std::move(draw), std::move(compensate)));
+        std::move(context), scene.mesh, prepared, std::move(draw), std::move(compensate)));
     if (glCheckNamedFramebufferStatus(renderer->target_framebuffer_.id(), GL_FRAMEBUFFER) !=
         GL_FRAMEBUFFER_COMPLETE)
       return fail(Errc::kUnavailable,
@@ -117,6 +117,15 @@ class GlRenderer final : public Renderer {
 
   Status set_profile(const PreparedProfile& prepared) override {
     VENEER_TRY(check_exchangeable({width_, height_, bits_}, prepared.profile()));
+    // A bright fault is the worst: no profile lifts the ceiling by mistake.
+    const double ceiling = prepared.compensation().ceiling().nits();
+    if (ceiling != ceiling_)
+      return fail(
+          Errc::kInvalidOption,
+          "exchanging the profile: it was prepared for a luminance ceiling of {} cd/m^2, and "
+          "the picture has one of {}; restart to change it",
+          ceiling,
+          ceiling_);
     context_.make_current();
     VENEER_TRY(compensate_.set_profile(prepared));
     draw_.set_projector(prepared.profile());
@@ -161,6 +170,7 @@ class GlRenderer final : public Renderer {
     statistics.covered_pixels = counts.covered;
     statistics.out_of_gamut_pixels = counts.out_of_gamut;
     statistics.out_of_reach_pixels = counts.out_of_reach;
+    statistics.held_pixels = counts.held;
     if (counts.covered > 0)
       statistics.gamut_loss_mean = counts.gamut_loss / static_cast<double>(counts.covered);
     if (const auto times = timer_.times()) {
@@ -175,13 +185,14 @@ class GlRenderer final : public Renderer {
  private:
   GlRenderer(EglContext context,
              const Mesh& mesh,
-             const calibration::ProjectorProfile& profile,
+             const PreparedProfile& prepared,
              DrawPass draw,
              CompensatePass compensate)
       : context_(std::move(context)),
-        width_(profile.geometry.width),
-        height_(profile.geometry.height),
-        bits_(profile.bits),
+        width_(prepared.profile().geometry.width),
+        height_(prepared.profile().geometry.height),
+        bits_(prepared.profile().bits),
+        ceiling_(prepared.compensation().ceiling().nits()),
         mesh_(mesh),
         target_(make_texture_2d(GL_RGBA16F, width_, height_)),
         depth_(make_texture_2d(GL_DEPTH_COMPONENT32F, width_, height_)),
@@ -215,6 +226,7 @@ class GlRenderer final : public Renderer {
   int width_;
   int height_;
   int bits_;
+  double ceiling_;
   MeshBuffers mesh_;
   GlTexture target_;
   GlTexture depth_;

@@ -17,7 +17,7 @@ constexpr GLuint maximum_of(int bits) { return (1U << static_cast<unsigned>(bits
 std::string scanout_fragment_source() { return std::string("#version 450 core\n") + kScanoutFrag; }
 
 Result<ScanoutPass> ScanoutPass::create(int code_bits) {
-  VENEER_CHECK(code_bits > 0 && code_bits <= 14);
+  VENEER_CHECK(code_bits > 0 && code_bits <= 16);
   ScanoutPass pass;
   VENEER_ASSIGN(pass.program_,
                 link_program({{GL_VERTEX_SHADER, "fullscreen.vert", fullscreen_vertex_source()},

@@ -17,7 +17,7 @@ namespace veneer::render {
 /// framebuffer. Needs a current context, always the same.
 class ScanoutPass {
  public:
-  /// @param code_bits  of a code, at most 14.
+  /// @param code_bits  of a code, at most 16.
   /// Errors: kUnavailable (the driver refuses a shader).
   [[nodiscard]] static Result<ScanoutPass> create(int code_bits);
   /// @param codes  RGBA16UI texture.

@@ -16,7 +16,8 @@ TEST(Shaders, AreValidByTheReferenceCompiler) {
   if (!has_glslang()) GTEST_SKIP() << "glslangValidator absent: install glslang-tools";
   for (const CompensateKind kind :
        {CompensateKind::kNone, CompensateKind::kPlain, CompensateKind::kResidual})
-    EXPECT_EQ(glslang_complaints(compensate_fragment_source(kind), "frag"), "");
+    for (const bool has_ceiling : {false, true})
+      EXPECT_EQ(glslang_complaints(compensate_fragment_source(kind, has_ceiling), "frag"), "");
   EXPECT_EQ(glslang_complaints(fullscreen_vertex_source(), "vert"), "");
   EXPECT_EQ(glslang_complaints(count_compute_source(), "comp"), "");
   EXPECT_EQ(glslang_complaints(scanout_fragment_source(), "frag"), "");

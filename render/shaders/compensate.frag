@@ -16,6 +16,11 @@ layout(std140, binding = 1) uniform Compensation {
   int gamut_steps;
   vec4 correction_full;   // DriveCorrection::Axes; read with RESIDUAL alone
   ivec4 correction_axes;  // steps, below, nodes - 1
+  vec4 nits;              // LuminanceCeiling, read with CEILING alone: Y of the primaries; w: of black
+  float ceiling_limit;
+  int ceiling_steps;
+  int code_count;          // of a channel
+  int last_residual_node;  // 0: no residual
 } constants;
 
 layout(binding = 0) uniform sampler2D target_texture;
@@ -26,9 +31,14 @@ layout(binding = 4) uniform sampler2D reflectance_texture;  // of the raster's s
 #ifdef RESIDUAL
 layout(binding = 5) uniform sampler3D correction_texture;  // tau - t* of every node
 #endif
+#ifdef CEILING
+layout(binding = 6) uniform sampler2D light_texture;  // t of every code, LEVELS_WIDTH to a row
+layout(binding = 7) uniform sampler3D residual_texture;  // rho of every node
+#endif
 uniform uint dither_seed;
 
-layout(location = 0) out uvec4 codes;  // a: PixelState << 14 | gamut loss in units of 1/64
+// a: PixelState << 14 | held under the ceiling << 13 | gamut loss in units of 1/32
+layout(location = 0) out uvec4 codes;
 
 const uint kNotCovered = 0u;
 const uint kInGamut = 1u;
@@ -49,15 +59,9 @@ bool is_inside(vec3 drive, float tolerance) {
   return smallest(drive) >= -tolerance && largest(drive) <= 1.0 + tolerance;
 }
 
-#ifdef RESIDUAL
-const bool kCorrects = true;
-
-// tau of a wanted linear drive: DriveCorrection.
-vec3 corrected(vec3 wanted) {
-  vec3 part = wanted / constants.correction_full.xyz;
-  int last_node = constants.correction_axes.z;
-  vec3 node = sign(part) * sqrt(abs(part)) * float(constants.correction_axes.x) +
-              float(constants.correction_axes.y);
+#if defined(RESIDUAL) || defined(CEILING)
+// A table of tetrahedra: ColourResidual, DriveCorrection.
+vec3 between_nodes(sampler3D table, vec3 node, int last_node) {
   node = clamp(node, 0.0, float(last_node));
   ivec3 cell = min(ivec3(node), last_node - 1);
   vec3 f = node - vec3(cell);
@@ -70,11 +74,23 @@ vec3 corrected(vec3 wanted) {
   const ivec3 kZ = ivec3(0, 0, 1);
   ivec3 first = f.x >= f.y ? (f.x >= f.z ? kX : kZ) : (f.y >= f.z ? kY : kZ);
   ivec3 last = f.x < f.y ? (f.x < f.z ? kX : kZ) : (f.y < f.z ? kY : kZ);
-  vec3 correction = (1.0 - most) * texelFetch(correction_texture, cell, 0).rgb;
-  correction += (most - middle) * texelFetch(correction_texture, cell + first, 0).rgb;
-  correction += (middle - least) * texelFetch(correction_texture, cell + 1 - last, 0).rgb;
-  correction += least * texelFetch(correction_texture, cell + 1, 0).rgb;
-  return wanted + correction;
+  vec3 value = (1.0 - most) * texelFetch(table, cell, 0).rgb;
+  value += (most - middle) * texelFetch(table, cell + first, 0).rgb;
+  value += (middle - least) * texelFetch(table, cell + 1 - last, 0).rgb;
+  value += least * texelFetch(table, cell + 1, 0).rgb;
+  return value;
+}
+#endif
+
+#ifdef RESIDUAL
+const bool kCorrects = true;
+
+// tau of a wanted linear drive: DriveCorrection.
+vec3 corrected(vec3 wanted) {
+  vec3 part = wanted / constants.correction_full.xyz;
+  vec3 node = sign(part) * sqrt(abs(part)) * float(constants.correction_axes.x) +
+              float(constants.correction_axes.y);
+  return wanted + between_nodes(correction_texture, node, constants.correction_axes.z);
 }
 vec3 full_drive() { return constants.correction_full.xyz; }
 #else
@@ -159,8 +175,15 @@ vec2 level(int index) {
   return texelFetch(levels_texture, ivec2(index % LEVELS_WIDTH, index / LEVELS_WIDTH), 0).rg;
 }
 
-// For each channel one of the two codes that bracket the drive in linear light.
-uvec3 codes_of(vec3 drive, vec3 threshold) {
+// The two codes of each channel whose outputs enclose a drive.
+struct Brackets {
+  vec3 below;
+  vec3 above;
+  uvec3 lower;
+  uvec3 upper;
+};
+
+Brackets brackets_of(vec3 drive) {
   ivec3 piece = min(ivec3(sqrt(drive) * SEED_COUNT), SEED_COUNT - 1);
   ivec3 low;
   ivec3 high;
@@ -179,16 +202,71 @@ uvec3 codes_of(vec3 drive, vec3 threshold) {
     low = mix(middle, low, above);
     high = mix(high, max(middle - 1, low), above);
   }
-  uvec3 chosen;
+  Brackets b;
   for (int i = 0; i < 3; ++i) {
     vec2 lower = level(first[i] + low[i]);
     vec2 upper = level(first[i] + min(low[i] + 1, last[i]));
-    // The highest level has none above it: there both are the same, and the lower one is taken.
-    bool up = drive[i] - lower.x > threshold[i] * (upper.x - lower.x) && upper.x > lower.x;
-    chosen[i] = uint(up ? upper.y : lower.y);
+    b.below[i] = lower.x;
+    b.above[i] = upper.x;
+    b.lower[i] = uint(lower.y);
+    b.upper[i] = uint(upper.y);
   }
-  return chosen;
+  return b;
 }
+
+// For each channel one of the two.
+uvec3 chosen(Brackets b, vec3 drive, vec3 threshold) {
+  uvec3 result;
+  for (int i = 0; i < 3; ++i) {
+    // The highest level has none above it: there both are the same, and the lower one is taken.
+    bool up = drive[i] - b.below[i] > threshold[i] * (b.above[i] - b.below[i]) &&
+              b.above[i] > b.below[i];
+    result[i] = up ? b.upper[i] : b.lower[i];
+  }
+  return result;
+}
+
+#ifdef CEILING
+// The highest that any threshold chooses.
+uvec3 highest(Brackets b, vec3 drive) { return chosen(b, drive, vec3(0.0)); }
+
+vec3 residual_of(vec3 t) {
+  int last_node = constants.last_residual_node;
+  if (last_node == 0) return vec3(0.0);
+  return between_nodes(residual_texture, sqrt(t) * float(last_node), last_node);
+}
+
+bool is_allowed(uvec3 code) {
+  vec3 t;
+  for (int i = 0; i < 3; ++i) {
+    int at = i * constants.code_count + int(code[i]);
+    t[i] = texelFetch(light_texture, ivec2(at % LEVELS_WIDTH, at / LEVELS_WIDTH), 0).r;
+  }
+  return dot(constants.nits.xyz, t + residual_of(t)) + constants.nits.w <= constants.ceiling_limit;
+}
+
+// Holds codes under the ceiling, and says whether they had to be: Compensation::hold().
+bool hold(vec3 drive, Brackets wanted, vec3 threshold, inout uvec3 code) {
+  uvec3 before = highest(wanted, drive);
+  bool is_over = !is_allowed(before);
+  vec3 sent = kCorrects ? drive + residual_of(drive) : drive;
+  float root = 0.0;
+  float way_left = 0.5;
+  // No turn where nothing is over, and of no constant count: software rasterisers skip no branch.
+  for (int i = 0; i < (is_over ? constants.ceiling_steps : 0); ++i) {
+    float tried = root + way_left;
+    vec3 scaled = clamp(corrected(tried * tried * sent), 0.0, 1.0);
+    if (is_allowed(highest(brackets_of(scaled), scaled))) root = tried;
+    way_left *= 0.5;
+  }
+  if (!is_over) return false;
+  vec3 under = root > 0.0 ? clamp(corrected(root * root * sent), 0.0, 1.0) : vec3(0.0);
+  Brackets b = brackets_of(under);
+  code = chosen(b, under, threshold);
+  if (!is_allowed(code)) code = highest(b, under);
+  return before != uvec3(0u);
+}
+#endif
 
 void main() {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
@@ -225,6 +303,13 @@ void main() {
 #endif
   }
   drive = clamp(drive, 0.0, 1.0);
-  codes = uvec4(codes_of(drive, dither_thresholds(uvec2(pixel))),
-                (state << 14) | min(uint(loss * 64.0 + 0.5), 0x3fffu));
+  vec3 threshold = dither_thresholds(uvec2(pixel));
+  Brackets brackets = brackets_of(drive);
+  uvec3 code = chosen(brackets, drive, threshold);
+  uint held = 0u;
+#ifdef CEILING
+  if (hold(drive, brackets, threshold, code)) held = 1u;
+#endif
+  codes.rgb = code;
+  codes.a = (state << 14) | (held << 13) | min(uint(loss * 32.0 + 0.5), 0x1fffu);
 }
