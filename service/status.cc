@@ -25,6 +25,18 @@ std::string_view name_of(FaultKind kind) {
   return kNames[static_cast<std::size_t>(kind)];
 }
 
+std::optional<State> state_named(std::string_view name) {
+  for (std::size_t i = 0; i < kStateCount; ++i)
+    if (name_of(static_cast<State>(i)) == name) return static_cast<State>(i);
+  return {};
+}
+
+std::optional<FaultKind> fault_kind_named(std::string_view name) {
+  for (std::size_t i = 0; i < kFaultKindCount; ++i)
+    if (name_of(static_cast<FaultKind>(i)) == name) return static_cast<FaultKind>(i);
+  return {};
+}
+
 State effect_of(FaultKind kind) {
   switch (kind) {
     case FaultKind::kOutput:

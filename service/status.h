@@ -23,6 +23,8 @@ enum class State {
 };
 inline constexpr std::size_t kStateCount = 6;
 [[nodiscard]] std::string_view name_of(State state);
+/// The inverse of name_of(); nothing where no state is named so.
+[[nodiscard]] std::optional<State> state_named(std::string_view name);
 
 /// What can be wrong. Each kind stands once in the list of faults, from when it began until it is
 /// over.
@@ -42,6 +44,7 @@ enum class FaultKind {
 };
 inline constexpr std::size_t kFaultKindCount = 12;
 [[nodiscard]] std::string_view name_of(FaultKind kind);
+[[nodiscard]] std::optional<FaultKind> fault_kind_named(std::string_view name);
 /// The state that a fault of this kind brings at least.
 [[nodiscard]] State effect_of(FaultKind kind);
 /// Once the cause has gone, the fault is over after no more than this; stated in
@@ -68,7 +71,24 @@ struct LatencyBudget {
   [[nodiscard]] double total() const {
     return tracker + hand_off + wait + draw + gpu_draw + compensate + present + display;
   }
+  bool operator==(const LatencyBudget&) const = default;
 };
+
+/// A stage by its name, in the order in which a pose goes through them: what lists the stages (the
+/// bus, metrics, tables) goes by this.
+struct LatencyStage {
+  std::string_view name;
+  double LatencyBudget::*milliseconds;
+};
+inline constexpr std::array<LatencyStage, 8> kLatencyStages{
+    LatencyStage{"tracker", &LatencyBudget::tracker},
+    LatencyStage{"hand_off", &LatencyBudget::hand_off},
+    LatencyStage{"wait", &LatencyBudget::wait},
+    LatencyStage{"draw", &LatencyBudget::draw},
+    LatencyStage{"gpu_draw", &LatencyBudget::gpu_draw},
+    LatencyStage{"compensate", &LatencyBudget::compensate},
+    LatencyStage{"present", &LatencyBudget::present},
+    LatencyStage{"display", &LatencyBudget::display}};
 
 /// All that veneerd tells of itself.
 struct ServiceStatus {
