@@ -116,6 +116,12 @@ std::string text_of(const Command& command) {
       command);
 }
 
+std::string_view method_name_of(const Command& command) {
+  constexpr std::array<std::string_view, std::variant_size_v<Command>> kNames{
+      "LoadMaterial", "SetScene", "SetLight", "Blank", "Reload", "Snapshot"};
+  return kNames[command.index()];
+}
+
 Status check(const Command& command) {
   return std::visit(
       Overloaded{[](const LoadMaterial& c) { return check_path("loading a material", c.path); },

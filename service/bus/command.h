@@ -31,6 +31,9 @@ using Command = std::variant<LoadMaterial, SetScene, SetLight, Blank, Reload, Sn
 /// For texts: "loading the material /a/b.safetensors". Readable whatever the command holds.
 [[nodiscard]] std::string text_of(const Command& command);
 
+/// The name of its method on the bus.
+[[nodiscard]] std::string_view method_name_of(const Command& command);
+
 /// Whether the daemon is to be troubled with it. Errors: kInvalidOption (a path that is not
 /// absolute, too long or holds control characters; a light that is none; an index below 0).
 [[nodiscard]] Status check(const Command& command);
