@@ -208,12 +208,11 @@ Result<std::unique_ptr<MetricsPort>> MetricsPort::open(const ServiceControl& con
     return fail(Errc::kInvalidOption, "offering metrics: {} is no port; 1 to 65535 are", port);
   try {
     return std::make_unique<MetricsPortImpl>(control, port);
-  } catch (const std::exception& error) {
+  } catch (const std::exception&) {  // its text names neither the port nor the reason
     return fail(Errc::kUnavailable,
-                "offering metrics on 127.0.0.1:{}: {}; another program has the port, or it is for "
-                "root alone: choose another as service.metrics_port",
-                port,
-                error.what());
+                "offering metrics: the port 127.0.0.1:{} cannot be had; another program has it, or "
+                "it is for root alone: choose another as service.metrics_port",
+                port);
   }
 }
 

@@ -15,7 +15,7 @@ namespace veneer::service {
 
 /// Answers Prometheus over HTTP, at http://127.0.0.1:PORT/metrics and nowhere else: whoever is to
 /// see it from outside goes through a proxy that knows them. status() is asked once a scrape, on a
-/// thread of its own.
+/// thread of its own. Its end may take two seconds: CivetWeb looks that often whether it is over.
 class MetricsPort {
  public:
   /// @param control  borrowed; must outlive it.

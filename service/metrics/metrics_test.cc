@@ -230,12 +230,19 @@ TEST(MetricsFile, IsWrittenAgainOnceItsFolderIsBack) {
   FakeControl control;
   const auto file = MetricsFile::open(control, sub / "v.prom", 2ms);
   ASSERT_TRUE(file) << file.error().what;
-  std::filesystem::remove_all(sub);
-  ASSERT_TRUE(write_text(sub.string() + ".tmp", "in the way"));
+  // A file takes the folder's place; the writer makes the folder anew if it is quicker.
+  const std::filesystem::path blocker = folder.path() / "blocker";
+  ASSERT_TRUE(write_text(blocker, "in the way"));
   std::error_code taken;
-  std::filesystem::rename(sub.string() + ".tmp", sub, taken);  // fails where it is back already
+  int moved = 0;
+  do {
+    std::error_code ignored;
+    std::filesystem::rename(sub, folder.path() / fmt::format("old{}", moved++), ignored);
+    std::filesystem::rename(blocker, sub, taken);
+  } while (taken && moved < 1000);
+  ASSERT_FALSE(taken) << taken.message();
   std::this_thread::sleep_for(20ms);
-  std::filesystem::remove_all(sub);
+  std::filesystem::rename(sub, blocker);
   bool back = false;
   for (const Time end = SteadyClock().now() + 20s; !back && SteadyClock().now() < end;)
     back = std::filesystem::exists(sub / "v.prom");

@@ -77,6 +77,11 @@ void Notifier::reloaded() {
   say("READY=1\nSTATUS=" + said_);
 }
 
+void Notifier::stopping() {
+  const std::scoped_lock lock(mutex_);
+  say_stopping();
+}
+
 void Notifier::run() {
   std::unique_lock lock(mutex_);
   Duration poll = options_.poll;

@@ -43,6 +43,8 @@ class Notifier {
   /// told.
   void reloading();
   void reloaded();
+  /// STOPPING=1, once; any thread. Nothing is said after it.
+  void stopping();
 
  private:
   Notifier(const ServiceControl& control, const NotifyOptions& options);
