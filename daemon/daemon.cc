@@ -10,6 +10,7 @@
 #include "btf/material.h"
 #include "calibration/profile_store.h"
 #include "daemon/config.h"
+#include "daemon/first_start.h"
 #include "daemon/profile_watcher.h"
 #include "daemon/recording_tracker.h"
 #include "projector/outputs.h"
@@ -24,6 +25,7 @@ Result<Summary> run(const std::filesystem::path& config_path,
                     std::atomic<bool>* check_profile) {
   VENEER_ASSIGN(TomlReader toml, TomlReader::open(config_path, settings));
   VENEER_ASSIGN(Config config, Config::read(toml));
+  VENEER_TRY(check_files_are_there(config));
   // On a virtual clock a run is repeatable, so that nothing may come in between.
   config.render.exchangeable = config.clock == ClockKind::kMonotonic;
 

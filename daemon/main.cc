@@ -9,6 +9,7 @@
 
 #include "base/exit_code.h"
 #include "daemon/daemon.h"
+#include "daemon/manual_page.h"
 
 namespace {
 
@@ -35,10 +36,17 @@ int main(int argc, char** argv) {
                  settings,
                  "Replace a value of the configuration: --set frames=120 --set output.every=10");
   app.add_flag("--quiet", quiet, "Say only what goes wrong");
+  bool manual = false;
+  app.add_flag("--manual", manual, "Print the manual page")->group("");  // for the installation
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kExitDone : kExitUsage;
+  }
+
+  if (manual) {
+    fmt::print("{}", daemon::manual_page(app));
+    return kExitDone;
   }
 
   spdlog::set_default_logger(spdlog::stderr_color_mt("veneerd"));

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/first_start.h"
+
+#include <string>
+#include <string_view>
+#include <system_error>
+
+namespace veneer::daemon {
+namespace {
+
+/// A folder of older profiles counts too: the newest good one of them is drawn with.
+bool has_profile(const std::filesystem::path& profile) {
+  std::error_code error;
+  return std::filesystem::exists(profile, error) ||
+         std::filesystem::exists(profile.string() + ".history", error);
+}
+
+void add_missing(std::string& missing,
+                 std::string_view what,
+                 const std::filesystem::path& path,
+                 std::string_view cure) {
+  missing += fmt::format("\n  {} {}: {}", what, path.string(), cure);
+}
+
+}  // namespace
+
+Status check_files_are_there(const Config& config) {
+  std::error_code error;
+  std::string missing;
+  if (!std::filesystem::exists(config.scene, error)) {
+    add_missing(missing,
+                "scene",
+                config.scene,
+                "say in it which object stands where, who looks and by what light; begin with "
+                "demo/scene.toml of the examples");
+  }
+  if (!std::filesystem::exists(config.material, error)) {
+    add_missing(missing,
+                "material",
+                config.material,
+                "\"veneer fit SET.btfset --model texel-colours -o FILE\" makes one");
+  }
+  if (!has_profile(config.profile)) {
+    add_missing(missing,
+                "profile",
+                config.profile,
+                "\"veneer calibrate --rig RIG.toml -o FOLDER\" measures the projector");
+  }
+  if (missing.empty()) return {};
+  return fail(Errc::kNotFound,
+              "starting: there is nothing to show yet. What the configuration names is not there, "
+              "or user veneer may not look there:{}",
+              missing);
+}
+
+}  // namespace veneer::daemon
