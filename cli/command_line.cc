@@ -6,10 +6,17 @@
 #include <algorithm>
 #include <cstdio>
 #include <new>
+#include <utility>
 
 #include "base/exit_code.h"
 
 namespace veneer::cli {
+namespace {
+
+/// Ends a command whose declarations were all that was wanted. No error, and not for its eyes.
+struct Declared {};
+
+}  // namespace
 
 CommandLine::CommandLine(const std::string& name,
                          std::string summary,
@@ -19,7 +26,19 @@ CommandLine::CommandLine(const std::string& name,
   app_.add_flag("--quiet", quiet_, "Show no progress");
 }
 
+bool CommandLine::starts_with(const std::string& name, std::string summary) {
+  variants_.push_back({name, std::move(summary)});
+  return !arguments_.empty() && arguments_.front() == name;
+}
+
 void CommandLine::parse() {
+  if (only_declare_) throw Declared{};
+  if (!variants_.empty() && app_.get_footer().empty()) {
+    std::string footer = "Its other tasks, each with options of its own:";
+    for (const Variant& variant : variants_)
+      footer += fmt::format("\n  {} {} --help: {}", app_.get_name(), variant.name, variant.summary);
+    app_.footer(footer);
+  }
   std::ranges::reverse(arguments_);  // CLI11 takes them last first
   app_.parse(arguments_);
   if (quiet_) {
@@ -36,6 +55,43 @@ void CommandLine::print(const nlohmann::ordered_json& object, const std::string&
 
 void CommandLine::note(const std::string& text) const {
   if (!quiet_) fmt::print(stderr, "{}\n", text);
+}
+
+manual::Usage usage_of(const Command& command) {
+  const auto declare = [&command](CommandLine& line) {
+    line.only_declare_ = true;
+    try {
+      (void)command.run(line);
+    } catch (const Declared&) {
+      return;
+    }
+    VENEER_CHECK(false);  // a command parses before it does anything
+  };
+  const std::string name(command.name);
+  CommandLine line(name, std::string(command.summary), {});
+  declare(line);
+  manual::Usage usage = manual::usage_of(line.app(), line.app().get_name());
+  for (const CommandLine::Variant& variant : line.variants_) {
+    CommandLine each(name + " " + variant.name, variant.summary, {variant.name});
+    declare(each);
+    manual::Usage task = manual::usage_of(each.app(), each.app().get_name());
+    // It declares its own name as an argument or as a command: neither is shown again.
+    const std::string word = manual::upper(variant.name);
+    std::erase_if(task.options, [&word](const manual::Option& option) {
+      return option.names.empty() && option.value == word;
+    });
+    for (const manual::Usage& below : std::exchange(task.commands, {})) {
+      for (const manual::Option& option : below.options) {
+        if (std::ranges::find(task.options, option.names, &manual::Option::names) ==
+                task.options.end() ||
+            option.names.empty())
+          task.options.push_back(option);
+      }
+    }
+    task.command_required = false;
+    usage.commands.push_back(std::move(task));
+  }
+  return usage;
 }
 
 int run_command(const Command& command, std::vector<std::string> arguments) {

@@ -9,10 +9,13 @@
 #include <string_view>
 #include <vector>
 
+#include "base/manual/usage.h"
 #include "base/progress.h"
 #include "base/result.h"
 
 namespace veneer::cli {
+
+struct Command;
 
 /// What every command has in common: its arguments, --json, --quiet, progress and the result.
 class CommandLine {
@@ -21,10 +24,9 @@ class CommandLine {
 
   /// Where a command declares its options, before parse().
   [[nodiscard]] CLI::App& app() { return app_; }
-  /// For commands that do different things; empty without arguments. Before parse().
-  [[nodiscard]] std::string first_argument() const {
-    return arguments_.empty() ? "" : arguments_.front();
-  }
+  /// Whether the first argument is `name`: for commands that do different things, each with options
+  /// of its own. Before parse(). What was asked for is listed in the help and the manual.
+  [[nodiscard]] bool starts_with(const std::string& name, std::string summary);
   /// Reads the arguments into the declared options. Throws CLI::ParseError, which main() turns into
   /// help or a usage error.
   void parse();
@@ -38,8 +40,16 @@ class CommandLine {
   void note(const std::string& text) const;
 
  private:
+  friend manual::Usage usage_of(const Command& command);
+
   CLI::App app_;
   std::vector<std::string> arguments_;
+  struct Variant {
+    std::string name;
+    std::string summary;
+  };
+  std::vector<Variant> variants_;  // that starts_with() was asked for
+  bool only_declare_ = false;      // parse() ends the command
   bool json_ = false;
   bool quiet_ = false;
   std::unique_ptr<Progress> progress_;
@@ -54,6 +64,9 @@ struct Command {
   std::string_view summary;
   RunCommand run;
 };
+/// What the command declares, found by running it as far as its parse(). Its names for what it can
+/// do (CommandLine::starts_with) are commands below it.
+[[nodiscard]] manual::Usage usage_of(const Command& command);
 /// Runs a command with its arguments; says on standard error what went wrong. Returns the program's
 /// exit code.
 [[nodiscard]] int run_command(const Command& command, std::vector<std::string> arguments);

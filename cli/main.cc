@@ -7,12 +7,17 @@
 #include "base/exit_code.h"
 #include "cli/command_line.h"
 #include "cli/commands/commands.h"
+#include "cli/manual_pages.h"
 
 namespace {
 
 using namespace veneer;
 
 using cli::Command;
+
+// These two speak of the whole table.
+Result<int> run_completion(cli::CommandLine& line);
+Result<int> run_manual(cli::CommandLine& line);
 
 constexpr std::array kCommands{
     Command{"bench", "Time what this machine does: bench render, fit, query", &cli::run_bench},
@@ -23,6 +28,7 @@ constexpr std::array kCommands{
     Command{"compare",
             "Fit every model of the literature and print the published tables",
             &cli::run_compare},
+    Command{"completion", "Print what makes a shell complete the words of veneer", &run_completion},
     Command{"demo",
             "Run the main job without hardware and report what the eye receives",
             &cli::run_demo},
@@ -32,6 +38,7 @@ constexpr std::array kCommands{
     Command{
         "harness", "Rehearse the daemon with a tracker that fails as planned", &cli::run_harness},
     Command{"import", "Bring measured data of another format to a sample set", &cli::run_import},
+    Command{"manual", "Write the manual pages of veneer", &run_manual},
     Command{"projector", "Say how a projector is, and switch it", &cli::run_projector},
     Command{"render", "Draw one projector frame of a scene", &cli::run_render},
     Command{"synthesize", "Path-trace a material as a sample set", &cli::run_synthesize},
@@ -41,6 +48,11 @@ constexpr std::array kCommands{
             &cli::run_verify},
 };
 static_assert(std::ranges::is_sorted(kCommands, {}, &Command::name));
+
+Result<int> run_completion(cli::CommandLine& line) {
+  return cli::print_completion(line, kCommands);
+}
+Result<int> run_manual(cli::CommandLine& line) { return cli::write_manual(line, kCommands); }
 
 void print_usage(std::FILE* stream) {
   fmt::print(stream, "usage: veneer COMMAND [OPTIONS]\n\n");

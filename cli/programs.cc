@@ -17,7 +17,12 @@ namespace fs = std::filesystem;
 
 fs::path program_folder() { return fs::read_symlink("/proc/self/exe").parent_path(); }
 
-fs::path default_etc() { return (program_folder() / "../../etc").lexically_normal(); }
+fs::path default_etc() {
+  const fs::path installed = (program_folder() / "../share/veneer").lexically_normal();
+  std::error_code error;
+  if (fs::is_directory(installed, error)) return installed;
+  return (program_folder() / "../../etc").lexically_normal();
+}
 
 Status run_program(const std::string& name, std::vector<std::string> arguments) {
   const std::string path = (program_folder() / name).string();

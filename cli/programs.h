@@ -11,7 +11,8 @@ namespace veneer::cli {
 
 /// Where this program lies, and the others beside it.
 [[nodiscard]] std::filesystem::path program_folder();
-/// The project's folder etc: build/bin/veneer lies two folders below the project.
+/// The examples that are shipped: share/veneer beside the folder of an installed program, else the
+/// project's folder etc, as build/bin/veneer lies two folders below the project.
 [[nodiscard]] std::filesystem::path default_etc();
 /// Runs a program beside this one and waits for it. Errors: kIo with its exit code.
 [[nodiscard]] Status run_program(const std::string& name, std::vector<std::string> arguments);

@@ -8,11 +8,10 @@
 namespace veneer::daemon {
 namespace {
 
-/// A folder of older profiles counts too: the newest good one of them is drawn with.
-bool has_profile(const std::filesystem::path& profile) {
+/// A key that is not there at all is another mistake, of which the reader speaks.
+bool is_missing(const std::filesystem::path& path) {
   std::error_code error;
-  return std::filesystem::exists(profile, error) ||
-         std::filesystem::exists(profile.string() + ".history", error);
+  return !path.empty() && !std::filesystem::exists(path, error);
 }
 
 void add_missing(std::string& missing,
@@ -25,22 +24,22 @@ void add_missing(std::string& missing,
 }  // namespace
 
 Status check_files_are_there(const Config& config) {
-  std::error_code error;
   std::string missing;
-  if (!std::filesystem::exists(config.scene, error)) {
+  if (is_missing(config.scene)) {
     add_missing(missing,
                 "scene",
                 config.scene,
                 "say in it which object stands where, who looks and by what light; begin with "
                 "demo/scene.toml of the examples");
   }
-  if (!std::filesystem::exists(config.material, error)) {
+  if (is_missing(config.material)) {
     add_missing(missing,
                 "material",
                 config.material,
                 "\"veneer fit SET.btfset --model texel-colours -o FILE\" makes one");
   }
-  if (!has_profile(config.profile)) {
+  // A folder of older profiles counts too: the newest good one of them is drawn with.
+  if (is_missing(config.profile) && is_missing(config.profile.string() + ".history")) {
     add_missing(missing,
                 "profile",
                 config.profile,

@@ -57,5 +57,9 @@ TEST_F(FirstStart, TakesOlderProfilesForOne) {
   EXPECT_TRUE(check_files_are_there(config_).has_value());
 }
 
+TEST_F(FirstStart, LeavesKeysThatAreAbsentToTheReader) {
+  EXPECT_TRUE(check_files_are_there(Config{}).has_value());
+}
+
 }  // namespace
 }  // namespace veneer::daemon

@@ -117,11 +117,10 @@ nlohmann::ordered_json summary_of(const calibration::WizardOutcome& outcome,
 }  // namespace
 
 Result<int> run_calibrate(CommandLine& line) {
-  if (line.first_argument() == "geometry") return calibrate_geometry(line);
-  if (line.first_argument() == "colour") return calibrate_colour(line);
-  line.app().footer(
-      "veneer calibrate geometry --help  only the geometry, from pictures on disk\n"
-      "veneer calibrate colour --help    only colour models, from readings in a .ti3");
+  if (line.starts_with("geometry", "Measure only the geometry, from pictures on disk"))
+    return calibrate_geometry(line);
+  if (line.starts_with("colour", "Fit only colour models, to readings in a .ti3"))
+    return calibrate_colour(line);
   CalibrateOptions options;
   declare(line.app(), options);
   line.parse();

@@ -6,10 +6,12 @@
 namespace veneer::cli {
 
 Result<int> run_capture(CommandLine& line) {
-  const std::string what = line.first_argument();
-  if (what == "board") return capture_board(line);
-  if (what == "demo") return capture_demo(line);
-  if (what == "stokes") return capture_stokes(line);
+  if (line.starts_with("board", "Draw the board of marks that is printed and laid beside a sample"))
+    return capture_board(line);
+  if (line.starts_with("demo", "Go the whole way from pictures to frames in a virtual studio"))
+    return capture_demo(line);
+  if (line.starts_with("stokes", "Measure the polarisation in one raw mosaic"))
+    return capture_stokes(line);
   return capture_session(line);
 }
 

@@ -180,10 +180,6 @@ Status place_lights(capture::CapturePlan& plan) {
 }  // namespace
 
 Result<int> capture_session(CommandLine& line) {
-  line.app().footer(
-      "veneer capture board --help   the board to print\n"
-      "veneer capture stokes --help  the polarisation in one raw mosaic\n"
-      "veneer capture demo --help    the whole way, with a virtual studio");
   CaptureOptions options;
   declare(line.app(), options);
   line.parse();
