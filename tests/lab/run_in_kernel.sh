@@ -1,12 +1,20 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# run_in_kernel.sh WORK COMMAND...: boots Debian's kernel in an emulated machine, loads the modules
-# that MODULES names ("vivid node_types=0x101", one a line), runs COMMAND there as root and ends with
-# its exit status. For drivers that need devices which only a kernel of one's own can make up.
+# run_in_kernel.sh WORK COMMAND...: boots Debian's kernel in an emulated machine, runs COMMAND there as
+# root and ends with its exit status. For what only a kernel of one's own can make up: devices, a
+# display, services.
 #
-# The machine sees this machine's files read-only, at the same paths, and has no network and no disk;
-# what it writes to /run, where TMPDIR is, is lost. WORK is a folder where the kernel is kept (100 MB, fetched once with
-# apt) unless this machine runs one that has the modules. LAB_SECONDS bounds it all (default 150).
+# The machine sees this machine's files at the same paths; what it writes there is lost. It has no
+# network and no disk. WORK is a folder where the kernel is kept (100 MB, fetched once with apt)
+# unless this machine runs one that has the modules. The environment says what else it has:
+#
+#   MODULES      kernel modules with their options, "vivid node_types=0x101", one a line
+#   LAB_INIT     shell (default): COMMAND alone; systemd: it is the first process, with D-Bus, a
+#                journal and udev, and COMMAND is one of its units
+#   LAB_OUT      a folder that is /run/lab there: what is written to it stays
+#   LAB_SCREEN   WIDTHxHEIGHT: a display of that size (virtio-gpu). keep_screen.sh NAME, called there,
+#                keeps what is scanned out in LAB_OUT
+#   LAB_SECONDS  bounds it all (default 150)
 set -euo pipefail
 
 fail() {
@@ -23,6 +31,8 @@ for tool in qemu-system-x86_64:qemu-system-x86 busybox:busybox-static cpio:cpio 
 done
 mkdir -p "$work"
 MODULES=${MODULES:-}
+LAB_INIT=${LAB_INIT:-shell}
+LAB_SECONDS=${LAB_SECONDS:-150}
 
 # A kernel with its modules: that of this machine's /boot, or Debian's own, unpacked in WORK.
 find_kernel() {
@@ -62,52 +72,117 @@ load_list=$stage/root/modules/order
 : >"$load_list"
 # want MODULE OPTION...: it and what it stands on; a module that is built in needs nothing.
 want() {
-  local module=$1 path
+  local module=$1 path name found=false
   shift
   while read -r verb path _; do
     [[ $verb == insmod ]] || continue
     cp -n "$path" "$stage/root/modules/"
     path=$(basename "$path")
+    name=${path%.ko}
+    # The file may be spelt with dashes where the module is not.
+    if [[ ${name//-/_} == "$module" ]]; then found=true; fi
     grep -q "^$path" "$load_list" && continue
-    if [[ ${path%.ko} == "$module" ]]; then echo "$path $*"; else echo "$path"; fi >>"$load_list"
-  done < <(modprobe -d "$modules_root" -S "$release" --show-depends "$module") || true
-  grep -q "^$module.ko" "$load_list" ||
-    modprobe -d "$modules_root" -S "$release" --show-depends "$module" | grep -q '^builtin' ||
+    if [[ ${name//-/_} == "$module" ]]; then echo "$path $*"; else echo "$path"; fi >>"$load_list"
+  done < <(modprobe -d "$modules_root" -S "$release" --show-depends "$module")
+  $found || modprobe -d "$modules_root" -S "$release" --show-depends "$module" 2>&1 | grep -q '^builtin' ||
     fail "kernel $release has no module $module"
 }
-for module in virtio_pci 9pnet_virtio 9p; do want "$module"; done
+
+# shellcheck disable=SC2054  # the emulator's commas
+machine=(-machine q35 -accel tcg,thread=multi -cpu max -smp 2 -m 2048 -nodefaults -no-reboot -display none
+  -virtfs "local,path=/,mount_tag=files,security_model=none,readonly=on,multidevs=remap")
+for module in virtio_pci 9pnet_virtio 9p overlay; do want "$module"; done
+if [[ -n ${LAB_OUT:-} ]]; then
+  mkdir -p "$LAB_OUT"
+  LAB_OUT=$(readlink -f "$LAB_OUT")
+  machine+=(-virtfs "local,path=$LAB_OUT,mount_tag=out,security_model=none,multidevs=remap")
+fi
+if [[ -n ${LAB_SCREEN:-} ]]; then
+  want virtio_gpu
+  want virtio_console
+  # The emulator's monitor is plugged into a port of its own machine, so that whoever shows a picture
+  # there also says when it is to be kept.
+  machine+=(-device "virtio-vga,xres=${LAB_SCREEN%x*},yres=${LAB_SCREEN#*x}"
+    -chardev "socket,id=monitor,path=$stage/monitor,server=on,wait=off" -mon "chardev=monitor,mode=control"
+    -chardev "socket,id=plug,path=$stage/monitor"
+    -device virtio-serial-pci -device "virtserialport,chardev=plug,nr=1")
+fi
 while read -r module options; do
   # shellcheck disable=SC2086  # options are words
   if [[ -n $module ]]; then want "$module" $options; fi
 done <<<"$MODULES"
 
 printf '%q ' "$@" >"$stage/root/command"
-cat >"$stage/root/init" <<'INIT'
+cat >"$stage/root/init" <<INIT
 #!/bin/busybox sh
 PATH=/bin
+init=$LAB_INIT
+out=${LAB_OUT:-}
+INIT
+cat >>"$stage/root/init" <<'INIT'
 /bin/busybox --install -s /bin
-mkdir -p /proc /sys /dev /files
+mkdir -p /proc /sys /dev /files /over /new
 mount -t proc none /proc
 mount -t sysfs none /sys
 mount -t devtmpfs none /dev
 while read -r line; do insmod /modules/${line}; done </modules/order
-mount -t 9p -o trans=virtio,version=9p2000.L,msize=262144,cache=loose,ro files /files || echo "lab: no files"
-for folder in proc sys dev; do mount -o bind /$folder /files/$folder; done
-mount -t tmpfs none /files/run
-cp /command /files/run/command
-chroot /files /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/run TMPDIR=/run /bin/sh /run/command
-echo "lab-status $?"
+mount -t 9p -o trans=virtio,version=9p2000.L,msize=512000,cache=loose,ro files /files || echo "lab: no files"
+mount -t tmpfs none /over
+mkdir /over/up /over/work
+mount -t overlay -o lowerdir=/files,upperdir=/over/up,workdir=/over/work none /new || echo "lab: no overlay"
+mount -t tmpfs none /new/run
+if [ "$out" ]; then
+  mkdir /new/run/lab
+  mount -t 9p -o trans=virtio,version=9p2000.L,msize=512000,cache=none out /new/run/lab || echo "lab: no out"
+fi
+mkdir -p /dev/pts /dev/shm
+mount -t devpts none /dev/pts
+mount -t tmpfs none /dev/shm
+for folder in proc sys dev; do mount --move /$folder /new/$folder; done
+environment="PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/run TMPDIR=/run LAB_OUT=$out"
+{
+  echo "env -i $environment /bin/sh /run/lab-command </dev/null"
+  echo 'echo "lab-status $?"'
+} >/new/run/lab-main
+cp /command /new/run/lab-command
+if [ "$init" = systemd ]; then
+  mkdir -p /new/run/systemd/system
+  cat >/new/run/systemd/system/lab.service <<'UNIT'
+[Unit]
+DefaultDependencies=no
+Wants=dbus.service systemd-journald.service systemd-udevd.service
+After=dbus.service systemd-journald.service systemd-udevd.service
+[Service]
+Type=oneshot
+StandardOutput=tty
+StandardError=tty
+TTYPath=/dev/ttyS0
+ExecStart=/bin/sh /run/lab-main
+ExecStopPost=/bin/systemctl poweroff --force --force
+UNIT
+  # What a machine does at its first start, and what waits for disks and networks: nothing is tested
+  # with it here and it takes minutes.
+  for unit in systemd-tmpfiles-setup systemd-tmpfiles-setup-dev systemd-journal-flush \
+    systemd-hwdb-update systemd-journal-catalog-update systemd-machine-id-commit systemd-firstboot \
+    systemd-random-seed systemd-update-utmp systemd-udev-trigger systemd-update-done \
+    systemd-timesyncd systemd-resolved ldconfig; do
+    ln -s /dev/null /new/run/systemd/system/$unit.service
+  done
+  rm -f /new/etc/machine-id /new/etc/fstab
+  echo 0123456789abcdef0123456789abcdef >/new/etc/machine-id
+  exec switch_root /new /lib/systemd/systemd --unit=lab.service --log-target=null --show-status=0
+fi
+chroot /new /bin/sh /run/lab-main
 poweroff -f
 INIT
 chmod +x "$stage/root/init"
 (cd "$stage/root" && find . | cpio -o -H newc --quiet) >"$stage/initrd"
 
 # Emulation alone: no KVM is to be counted on where tests run.
-timeout "${LAB_SECONDS:-150}" qemu-system-x86_64 -machine q35 -accel tcg,thread=multi -cpu max -smp 2 -m 1024 \
-  -nodefaults -no-reboot -display none -serial "file:$stage/console" \
-  -kernel "$kernel" -initrd "$stage/initrd" -append "console=ttyS0 quiet panic=-1" \
-  -virtfs local,path=/,mount_tag=files,security_model=none,readonly=on,multidevs=remap </dev/null ||
-  echo "lab: the machine did not end by itself within ${LAB_SECONDS:-150} s" >&2
+timeout "$LAB_SECONDS" qemu-system-x86_64 "${machine[@]}" -serial "chardev:console" \
+  -chardev "file,id=console,path=$stage/console" \
+  -kernel "$kernel" -initrd "$stage/initrd" -append "console=ttyS0 quiet panic=-1" </dev/null ||
+  echo "lab: the machine did not end by itself within $LAB_SECONDS s" >&2
 tr -d '\r' <"$stage/console" | { grep -v -e '^lab-status ' -e 'reboot: Power down$' || true; }
 status=$(tr -d '\r' <"$stage/console" | sed -n 's/^lab-status //p')
 [[ -n $status ]] || fail "the command in the emulated machine came to no end; see its output above"
