@@ -143,6 +143,8 @@ environment="PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/run TMPDIR=/run LAB_OUT=$o
 {
   echo "env -i $environment /bin/sh /run/lab-command </dev/null"
   echo 'echo "lab-status $?"'
+  # At once: there is nothing to be kept.
+  echo 'echo o >/proc/sysrq-trigger; sleep 60'
 } >/new/run/lab-main
 cp /command /new/run/lab-command
 if [ "$init" = systemd ]; then
@@ -158,7 +160,6 @@ StandardOutput=tty
 StandardError=tty
 TTYPath=/dev/ttyS0
 ExecStart=/bin/sh /run/lab-main
-ExecStopPost=/bin/systemctl poweroff --force --force
 UNIT
   # What a machine does at its first start, and what waits for disks and networks: nothing is tested
   # with it here and it takes minutes.
@@ -172,8 +173,7 @@ UNIT
   echo 0123456789abcdef0123456789abcdef >/new/etc/machine-id
   exec switch_root /new /lib/systemd/systemd --unit=lab.service --log-target=null --show-status=0
 fi
-chroot /new /bin/sh /run/lab-main
-poweroff -f
+exec switch_root /new /bin/sh /run/lab-main
 INIT
 chmod +x "$stage/root/init"
 (cd "$stage/root" && find . | cpio -o -H newc --quiet) >"$stage/initrd"
