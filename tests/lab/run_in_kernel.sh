@@ -143,8 +143,8 @@ environment="PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/run TMPDIR=/run LAB_OUT=$o
 {
   echo "env -i $environment /bin/sh /run/lab-command </dev/null"
   echo 'echo "lab-status $?"'
-  # At once: there is nothing to be kept.
-  echo 'echo o >/proc/sysrq-trigger; sleep 60'
+  # At once: there is nothing to be kept, and no file can be read any more.
+  echo 'echo o >/proc/sysrq-trigger; while :; do :; done'
 } >/new/run/lab-main
 cp /command /new/run/lab-command
 if [ "$init" = systemd ]; then
@@ -183,7 +183,7 @@ timeout "$LAB_SECONDS" qemu-system-x86_64 "${machine[@]}" -serial "chardev:conso
   -chardev "file,id=console,path=$stage/console" \
   -kernel "$kernel" -initrd "$stage/initrd" -append "console=ttyS0 quiet panic=-1" </dev/null ||
   echo "lab: the machine did not end by itself within $LAB_SECONDS s" >&2
-tr -d '\r' <"$stage/console" | { grep -v -e '^lab-status ' -e 'reboot: Power down$' || true; }
+tr -d '\r' <"$stage/console" | { grep -v -e '^lab-status ' -e 'sysrq: Power Off$' -e 'reboot: Power down$' || true; }
 status=$(tr -d '\r' <"$stage/console" | sed -n 's/^lab-status //p')
 [[ -n $status ]] || fail "the command in the emulated machine came to no end; see its output above"
 exit "$status"

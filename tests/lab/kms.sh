@@ -1,0 +1,56 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# kms.sh BIN SOURCE WIDTH HEIGHT: in the emulated machine, with a display of that size: what Veneer
+# shows on it. Pictures that are to be equal are left in /run/lab: NAME.ppm of the screen beside NAME.png
+# as expected, and NAME.codes says by how much they may differ. lab.sh compares them.
+set -euo pipefail
+bin=$1
+source=$2
+width=$3
+height=$4
+# shellcheck source=tests/lab/expect.sh
+. "$source/tests/lab/expect.sh"
+
+# answer PATTERN: the next line of the program that says it, within a minute.
+answer() {
+  local line
+  while IFS= read -r -t 60 line <&"${program[0]}"; do
+    printf '        %s\n' "$line"
+    [[ $line =~ $1 ]] && return 0
+  done
+  return 1
+}
+
+# shown NAME BUFFERS: the known picture, on the screen from buffers of that kind; dark after it.
+shown() {
+  local name=$1 buffers=$2 status=0
+  coproc program { "$bin/veneer_lab_kms_picture" \
+    "driver = \"kms\"
+mode = \"${width}x$height\"
+buffers = \"$buffers\"
+state_directory = \"/run/state\"" "$width" "$height" "/run/lab/$name.png" 2>&1; }
+  # shellcheck disable=SC2154  # coproc assigns it
+  local id=$program_PID
+  if expect_line "presented" "$name: the picture is presented"; then
+    expect "$name: the screen is kept" "$source/tests/lab/keep_screen.sh" "$name"
+    echo 0 >"/run/lab/$name.codes"
+    echo blank >&"${program[1]}"
+    expect_line "blank" "$name: it goes dark when told to"
+    expect "$name: the dark screen is kept" "$source/tests/lab/keep_screen.sh" "$name-dark"
+    # All zeros, whatever was there before.
+    expect "$name: it is black" is_black "/run/lab/$name-dark.ppm"
+  fi
+  eval "exec ${program[1]}>&-"
+  wait "$id" || status=$?
+  expect "$name: the program ends well" test "$status" = 0
+}
+expect_line() {
+  if answer "$1"; then expect "$2" true; else expect "$2" false; return 1; fi
+}
+is_black() { [[ $(tail -c $((3 * width * height)) "$1" | tr -d '\0' | wc -c) == 0 ]]; }
+
+mkdir -p /run/state
+ls /dev/dri
+shown pixels-mapped mapped
+shown pixels-given-up auto
+expect_end
