@@ -24,7 +24,7 @@ answer() {
 # shown NAME BUFFERS: the known picture, on the screen from buffers of that kind; dark after it.
 shown() {
   local name=$1 buffers=$2 status=0
-  coproc program { "$bin/veneer_lab_kms_picture" \
+  coproc program { exec "$bin/veneer_lab_kms_picture" \
     "driver = \"kms\"
 mode = \"${width}x$height\"
 buffers = \"$buffers\"
@@ -49,8 +49,27 @@ expect_line() {
 }
 is_black() { [[ $(tail -c $((3 * width * height)) "$1" | tr -d '\0' | wc -c) == 0 ]]; }
 
+# The output's own program, told where to leave its picture.
+own_picture() {
+  local status=0
+  coproc program { exec "$bin/veneer_kms_lab_test" --seconds 600 --frames 12 --png /run/lab/output.png \
+    "mode=\"${width}x$height\"" 'state_directory="/run/state"' 2>&1; }
+  # shellcheck disable=SC2154  # coproc assigns it
+  local id=$program_PID
+  if expect_line "^presented" "output: its picture is presented"; then
+    expect "output: the screen is kept" "$source/tests/lab/keep_screen.sh" output
+    echo 0 >/run/lab/output.codes
+  fi
+  kill "$id" 2>/dev/null || true
+  wait "$id" || status=$?
+  expect "output: it held the picture until it was killed" test "$status" = 143
+}
+
 mkdir -p /run/state
-ls /dev/dri
+status=0
+"$bin/veneer_scanout_lab_test" --gtest_brief=1 || status=$?
+expect "the renderer draws into a display's buffers" test "$status" = 0
+own_picture
 shown pixels-mapped mapped
 shown pixels-given-up auto
 expect_end

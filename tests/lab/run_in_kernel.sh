@@ -13,7 +13,8 @@
 #                journal and udev, and COMMAND is one of its units
 #   LAB_OUT      a folder that is /run/lab there: what is written to it stays
 #   LAB_SCREEN   WIDTHxHEIGHT: a display of that size (virtio-gpu). keep_screen.sh NAME, called there,
-#                keeps what is scanned out in LAB_OUT
+#                keeps what is scanned out in LAB_OUT. Below 640x480 it has no EDID, which knows no such
+#                modes
 #   LAB_SECONDS  bounds it all (default 150)
 set -euo pipefail
 
@@ -102,7 +103,9 @@ if [[ -n ${LAB_SCREEN:-} ]]; then
   want virtio_console
   # The emulator's monitor is plugged into a port of its own machine, so that whoever shows a picture
   # there also says when it is to be kept.
-  machine+=(-device "virtio-vga,xres=${LAB_SCREEN%x*},yres=${LAB_SCREEN#*x}"
+  edid=on
+  if ((${LAB_SCREEN%x*} < 640)); then edid=off; fi
+  machine+=(-device "virtio-vga,xres=${LAB_SCREEN%x*},yres=${LAB_SCREEN#*x},edid=$edid"
     -chardev "socket,id=monitor,path=$stage/monitor,server=on,wait=off" -mon "chardev=monitor,mode=control"
     -chardev "socket,id=plug,path=$stage/monitor"
     -device virtio-serial-pci -device "virtserialport,chardev=plug,nr=1")
@@ -136,6 +139,7 @@ if [ "$out" ]; then
   mount -t 9p -o trans=virtio,version=9p2000.L,msize=512000,cache=none out /new/run/lab || echo "lab: no out"
 fi
 mkdir -p /dev/pts /dev/shm
+ln -sf /proc/self/fd /dev/fd
 mount -t devpts none /dev/pts
 mount -t tmpfs none /dev/shm
 for folder in proc sys dev; do mount --move /$folder /new/$folder; done

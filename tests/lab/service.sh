@@ -1,0 +1,121 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# service.sh PACKAGE.deb SOURCE SHOW: in the emulated machine, with systemd as its first process: veneerd
+# is installed from its package, shows what prepare_show.sh made and is started, asked, hung, killed,
+# misconfigured and stopped.
+set -euo pipefail
+package=$1
+source=$2
+show=$3
+# shellcheck source=tests/lab/expect.sh
+. "$source/tests/lab/expect.sh"
+
+name=org.veneer.Veneer1
+object=/org/veneer/Veneer1
+config=/etc/veneer/veneer.toml
+# What the emulated machine is slow at: compiling shaders and drawing. A real one needs a hundredth.
+patience=90
+watchdog=30
+
+as() {
+  local user=$1
+  shift
+  setpriv --reuid "$user" --regid "$(id -g "$user")" --init-groups -- "$@"
+}
+get() { busctl get-property "$name" "$object" "$name" "$1"; }
+call() { busctl call --timeout=30 "$name" "$object" "$name" "$@"; }
+unit() { systemctl show --value -p "$1" veneerd; }
+frames() { get Frames | cut -d ' ' -f 2; }
+# A frame went out since.
+more_frames_than() { (($(frames) > $1)); }
+# Started anew: another process, and ready.
+is_ready_as_another_than() { [[ $(unit ActiveState) == active && $(unit MainPID) != "$1" ]]; }
+# The emulated machine's frames are late, which is a fault in its own right.
+shows_a_picture() { says '"(running|degraded)"' get State; }
+journal() { journalctl --no-pager -o json -u veneerd "$@"; }
+
+# --- installed
+
+expect "the package installs" dpkg --install --force-depends --force-unsafe-io --no-triggers "$package"
+expect "the user veneer may use displays and devices" says 'video.*plugdev|plugdev.*video' id -Gn veneer
+expect "systemd finds nothing wrong with the unit" fails says 'veneerd.service' systemd-analyze verify veneerd.service
+cp -r "$show"/. /etc/veneer/
+chmod -R a+rX /etc/veneer
+cat >>"$config" <<'TOML'
+
+[service]
+bus = "system"
+TOML
+mkdir -p /run/systemd/system/veneerd.service.d
+cat >/run/systemd/system/veneerd.service.d/lab.conf <<UNIT
+[Service]
+WatchdogSec=$watchdog
+# Compile shaders without making them fast.
+Environment=GALLIVM_PERF=nopt
+UNIT
+systemctl daemon-reload
+useradd --no-create-home --groups veneer curator
+
+# --- started
+
+expect "it starts, and says when it is ready" timeout "$patience" systemctl start veneerd
+expect "it is active" says '^active$' unit ActiveState
+expect "it tells systemd what it is doing" says '.' unit StatusText
+expect "it runs as the user veneer" says '^veneer' ps -o user= -p "$(unit MainPID)"
+expect_within "$patience" "it shows a picture" shows_a_picture
+before=$(frames)
+expect_within "$patience" "frames go out" more_frames_than "$before"
+
+# --- asked and told over the bus
+
+expect "the bus tells what there is" says 'State +property +s' busctl introspect "$name" "$object"
+expect "and what can be called" says 'LoadMaterial +method +s' busctl introspect "$name" "$object"
+expect "a stranger may read" says '"' as nobody busctl get-property "$name" "$object" "$name" State
+stranger() { as nobody busctl call "$name" "$object" "$name" "$@"; }
+expect "a stranger may not blank it" says '[Aa]ccess *[Dd]enied|not permitted' stranger Blank b true
+expect "nor reload it" says '[Aa]ccess *[Dd]enied|not permitted' stranger Reload
+expect "nor load a material" says '[Aa]ccess *[Dd]enied|not permitted' stranger LoadMaterial s /etc/veneer/material.safetensors
+expect "and all of that changed nothing" shows_a_picture
+expect "a member of the group blanks it" as curator busctl call "$name" "$object" "$name" Blank b true
+expect_within "$patience" "it is blank" says '"blank"' get State
+expect "root takes that back" call Blank b false
+expect_within "$patience" "it shows a picture again" shows_a_picture
+expect "a material that is not there is refused" says 'nothing-here' call LoadMaterial s /nothing-here
+expect "veneer status speaks to it" says 'material' as nobody veneer status
+
+# --- a bad configuration
+
+first=$(unit MainPID)
+cp "$config" /run/good.toml
+echo 'this is = no configuration' >>"$config"
+systemctl reload veneerd
+expect_within "$patience" "a bad configuration is a fault" says '"configuration"' get Faults
+before=$(frames)
+expect_within "$patience" "and the old one is still shown" more_frames_than "$before"
+cp /run/good.toml "$config"
+systemctl reload veneerd
+expect_within "$patience" "a good one ends the fault" fails says '"configuration"' get Faults
+expect "all by one process" test "$(unit MainPID)" = "$first"
+
+# --- hung and killed
+
+kill -STOP "$first"
+expect_within $((watchdog + patience)) "one that hangs is killed and started anew" is_ready_as_another_than "$first"
+expect "the watchdog did it" says 'atchdog' journalctl --no-pager -u veneerd
+expect_within "$patience" "it shows a picture" shows_a_picture
+second=$(unit MainPID)
+kill -KILL "$second"
+expect_within "$patience" "one that is killed is started anew" is_ready_as_another_than "$second"
+expect "those were two restarts" says '^2$' unit NRestarts
+expect_within "$patience" "it shows a picture" shows_a_picture
+
+# --- stopped
+
+expect "it stops in time" timeout 30 systemctl stop veneerd
+expect "it is inactive" says '^inactive$' unit ActiveState
+expect "it ended well" says '^success$' unit Result
+expect "it left the bus" fails busctl status "$name"
+expect "the journal has its states as fields" says '"VENEER_STATE"' journal VENEER_STATE=stopping
+expect "and its faults" says '"VENEER_FAULT"' journal VENEER_FAULT=configuration
+expect "at the levels of the journal" says '"PRIORITY" *: *"[0-7]"' journal VENEER_FAULT=configuration
+expect_end
