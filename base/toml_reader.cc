@@ -111,6 +111,16 @@ Result<TomlReader> TomlReader::parse(std::string_view text, std::string_view ori
   return TomlReader(std::move(document), std::move(node));
 }
 
+TomlReader TomlReader::again() const {
+  auto document = std::make_shared<Document>();
+  document->origin = document_->origin;
+  document->folder = document_->folder;
+  document->root = document_->root;
+  auto node = std::make_shared<Node>(Node{&document->root, "", {}});
+  document->nodes.push_back(node);
+  return TomlReader(std::move(document), std::move(node));
+}
+
 bool TomlReader::contains(std::string_view key) const {
   return node_->table != nullptr && node_->table->contains(key);
 }

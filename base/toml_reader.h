@@ -34,6 +34,10 @@ class TomlReader {
   /// @param origin  what error messages call the text.
   [[nodiscard]] static Result<TomlReader> parse(std::string_view text, std::string_view origin);
 
+  /// A reader of the same text, as it was read then, of which nothing has been asked yet: for what
+  /// is opened again while somebody edits the file.
+  [[nodiscard]] TomlReader again() const;
+
   void read(std::string_view key, double& value);
   void read(std::string_view key, int& value);
   void read(std::string_view key, std::uint64_t& value);

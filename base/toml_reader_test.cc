@@ -142,5 +142,19 @@ TEST(TomlReader, TakesAScalarWhereATableShouldBeAsAMistake) {
   EXPECT_FALSE(toml.finish());
 }
 
+TEST(TomlReader, AgainForgetsWhatWasAskedAndWhatWasWrong) {
+  TomlReader toml = TomlReader::parse("a = 1\nb = 2\n", "x.toml").value();
+  int a = 0;
+  toml.read("a", a);
+  TomlReader again = toml.again();
+  ASSERT_FALSE(toml.finish()) << "nobody asked for b";
+  int b = 0;
+  again.read("b", b);
+  EXPECT_EQ(b, 2);
+  const Status status = again.finish();
+  ASSERT_FALSE(status) << "nobody asked it for a";
+  EXPECT_NE(status.error().what.find("x.toml:1"), std::string::npos) << status.error().what;
+}
+
 }  // namespace
 }  // namespace veneer

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/config.h"
 
+#include <cstdlib>
+
 namespace veneer::daemon {
 namespace {
 
@@ -19,6 +21,23 @@ void read_path(TomlReader& toml, std::string_view key, std::filesystem::path& pa
   if (!path.empty()) path = toml.folder() / path;
 }
 
+// systemd gives several, divided by colons, where a unit asks for several; the first is ours.
+std::filesystem::path state_directory_of_the_unit() {
+  const char* given = std::getenv("STATE_DIRECTORY");
+  if (given == nullptr) return {};
+  const std::string all = given;
+  return all.substr(0, all.find(':'));
+}
+
+void read_service(TomlReader toml, ServiceOptions& service) {
+  toml.read("bus", service.bus);
+  if (service.bus != "none" && service.bus != "system" && service.bus != "session")
+    toml.add_error("bus", "expected \"none\", \"system\" or \"session\"");
+  toml.read("metrics_port", service.metrics_port);
+  check_range(toml, "metrics_port", service.metrics_port, 0, 65535);
+  read_path(toml, "metrics_file", service.metrics_file, false);
+}
+
 }  // namespace
 
 Result<Config> Config::read(TomlReader& toml) {
@@ -29,6 +48,8 @@ Result<Config> Config::read(TomlReader& toml) {
   read_path(toml, "summary", config.summary, false);
   read_path(toml, "frame_log", config.frame_log, false);
   read_path(toml, "record", config.record, false);
+  read_path(toml, "state_directory", config.state_directory, false);
+  if (config.state_directory.empty()) config.state_directory = state_directory_of_the_unit();
 
   std::string clock = "monotonic";
   toml.read("clock", clock);
@@ -63,6 +84,26 @@ Result<Config> Config::read(TomlReader& toml) {
   if (const Status status = config.render.cache.check(); !status) {
     render.add_error("cache_spacing_px", status.error().what);
   }
+
+  render.read("luminance_ceiling", config.render.luminance_ceiling);
+  check_range(render, "luminance_ceiling", config.render.luminance_ceiling, 0, 1e6);
+
+  TomlReader pacing = toml.table("pacing");
+  std::string latch = "late";
+  pacing.read("latch", latch);
+  if (latch == "early") {
+    config.latch = Latch::kEarly;
+  } else if (latch != "late") {
+    pacing.add_error("latch", "expected \"late\" or \"early\"");
+  }
+  read_service(toml.table("service"), config.service);
+  config.has_control = toml.contains("control");
+  TomlReader control = toml.table("control");
+  control.read("poll_s", config.control_poll_s);
+  check_range(control, "poll_s", config.control_poll_s, 1, 3600);
+  control.ignore_the_rest();
+  toml.table("tracker").ignore_the_rest();
+  toml.table("output").ignore_the_rest();
 
   TomlReader prediction = toml.table("prediction");
   prediction.read("horizon_s", config.prediction.horizon_s);

@@ -19,8 +19,21 @@ enum class ClockKind {
   kVirtual,    ///< as fast as frames can be made, each one frame period after the last; repeatable
 };
 
-/// veneer.toml. Relative paths refer to the folder of the file. The tables [tracker] and [output]
-/// belong to their drivers.
+/// When a frame reads the pose, where the output has refreshes of its own.
+enum class Latch {
+  kLate,   ///< as late as the measured draw time allows
+  kEarly,  ///< as soon as the frame before is out
+};
+
+/// How the service speaks to the world; keys of the table [service].
+struct ServiceOptions {
+  std::string bus = "none";            ///< or "system" or "session"
+  int metrics_port = 0;                ///< of Prometheus, on the loopback; 0: none
+  std::filesystem::path metrics_file;  ///< likewise as a text file; none where empty
+};
+
+/// veneer.toml. Relative paths refer to the folder of the file. The tables [tracker], [output]
+/// and [control] belong to their drivers.
 struct Config {
   std::filesystem::path scene;
   std::filesystem::path material;
@@ -35,13 +48,20 @@ struct Config {
   std::filesystem::path summary;    ///< JSON written at the end; none where empty
   std::filesystem::path record;     ///< poses as they come, for the replay driver; none where empty
   std::filesystem::path frame_log;  ///< CSV, a line a frame; none where empty
+  /// Where snapshots and what must outlive the process go; by default the environment's
+  /// STATE_DIRECTORY, which systemd sets. None where empty.
+  std::filesystem::path state_directory;
+  Latch latch = Latch::kLate;
+  bool has_control = false;    ///< there is a table [control]
+  double control_poll_s = 30;  ///< how often the projector is asked how it is. 1 to 3600
+  ServiceOptions service;
   render::RendererOptions render;
   tracking::PredictionOptions prediction;
   tracking::PresenceOptions presence;
   tracking::ValidationOptions validation;
 
-  /// Reads all but [tracker] and [output]; the caller calls finish() when the drivers have read
-  /// theirs.
+  /// Reads all but what belongs to the drivers of the tracker, the output and the control, which is
+  /// left to whoever opens them; the caller calls finish().
   [[nodiscard]] static Result<Config> read(TomlReader& toml);
 };
 

@@ -3,100 +3,340 @@
 
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <utility>
 
-#include "btf/material.h"
-#include "calibration/profile_store.h"
-#include "daemon/config.h"
+#include "daemon/faults.h"
+#include "daemon/figures.h"
 #include "daemon/first_start.h"
-#include "daemon/profile_watcher.h"
+#include "daemon/frame_loop.h"
+#include "daemon/housekeeper.h"
+#include "daemon/memory_pressure.h"
+#include "daemon/output_keeper.h"
 #include "daemon/recording_tracker.h"
-#include "projector/outputs.h"
-#include "tracking/drivers.h"
+#include "daemon/reloader.h"
+#include "daemon/show_loader.h"
+#include "daemon/snapshots.h"
 
 namespace veneer::daemon {
+namespace {
 
-Result<Summary> run(const std::filesystem::path& config_path,
-                    const std::vector<std::string>& settings,
-                    const std::atomic<bool>& stop,
-                    Progress& progress,
-                    std::atomic<bool>* check_profile) {
-  VENEER_ASSIGN(TomlReader toml, TomlReader::open(config_path, settings));
-  VENEER_ASSIGN(Config config, Config::read(toml));
-  VENEER_TRY(check_files_are_there(config));
-  // On a virtual clock a run is repeatable, so that nothing may come in between.
-  config.render.exchangeable = config.clock == ClockKind::kMonotonic;
+using service::FaultKind;
 
-  // Mistakes in the configuration are found before any device is touched for long: opening is
-  // quick.
-  std::unique_ptr<Clock> clock;
-  if (config.clock == ClockKind::kVirtual) {
-    clock = std::make_unique<VirtualClock>();
-  } else {
-    clock = std::make_unique<SteadyClock>();
+std::function<Result<double>()> pressure_of(const Devices& devices, ClockKind kind) {
+  if (devices.memory_pressure) return devices.memory_pressure;
+  // A run in virtual time is the same on every machine.
+  if (kind == ClockKind::kVirtual) return {};
+  return memory_pressure;
+}
+
+class TheDaemon final : public Daemon {
+ public:
+  TheDaemon(ConfigFile file, Config config, Devices devices)
+      : file_(std::move(file)),
+        config_(std::move(config)),
+        devices_(std::move(devices)),
+        housekeeper_(
+            clock(), config_.clock, faults_, board_, pressure_of(devices_, config_.clock)) {}
+
+  [[nodiscard]] Result<Summary> run(const std::atomic<bool>& stop, Progress& progress) override;
+  [[nodiscard]] service::ServiceStatus status() const override;
+  [[nodiscard]] std::uint64_t frames() const override { return board_.frames(); }
+  [[nodiscard]] Status load_material(const std::filesystem::path& material) override;
+  [[nodiscard]] Status set_scene(const std::filesystem::path& scene) override;
+  [[nodiscard]] Status set_light(int index, const service::LightSetting& light) override;
+  [[nodiscard]] Status blank(bool on) override;
+  [[nodiscard]] Status reload() override;
+  [[nodiscard]] Result<std::filesystem::path> snapshot() override;
+  [[nodiscard]] const ServiceOptions& service_options() const override { return config_.service; }
+
+ private:
+  /// What is made when a run begins.
+  struct Stage {
+    Stage(const TheDaemon& daemon,
+          PoseFeed::OpenTracker open,
+          std::unique_ptr<tracking::Tracker> tracker,
+          std::unique_ptr<projector::Output> screen,
+          const Script& script,
+          Clock& clock,
+          Faults& faults)
+        : raster(script.raster()),
+          poses(std::move(tracker),
+                std::move(open),
+                clock,
+                daemon.config_.clock,
+                bodies_of(script.scene),
+                daemon.config_.prediction,
+                daemon.config_.validation),
+          output(std::move(screen), daemon.devices_.open_output, clock, faults),
+          loader(daemon.devices_, daemon.config_.clock, poses, clock, faults),
+          reloader(daemon.file_, loader, faults, clock) {}
+    const render::RasterFormat raster;  // stays: who wants another one starts anew
+    PoseFeed poses;
+    OutputKeeper output;
+    ShowLoader loader;
+    Reloader reloader;
+  };
+  [[nodiscard]] Clock& clock() { return is_virtual() ? static_cast<Clock&>(virtual_) : steady_; }
+  [[nodiscard]] bool is_virtual() const { return config_.clock == ClockKind::kVirtual; }
+  [[nodiscard]] PoseFeed::OpenTracker open_tracker();
+  [[nodiscard]] Result<Stage*> stage() const;
+  [[nodiscard]] Status change(FaultKind about, std::function<Status(Script&)> edit);
+  [[nodiscard]] Time now() const { return is_virtual() ? virtual_.now() : steady_.now(); }
+  [[nodiscard]] Summary summary_of(const RunRecord& record, Time tracker_start) const;
+
+  const ConfigFile file_;
+  const Config config_;
+  const Devices devices_;
+  VirtualClock virtual_;
+  SteadyClock steady_;
+  Faults faults_;
+  FigureBoard board_;
+  Wishes wishes_;
+  Housekeeper housekeeper_;
+  std::optional<tracking::PoseRecorder> recorder_;
+  std::timed_mutex snapshot_turn_;
+  // Left when the run is over, so that who has seen it may use it.
+  std::unique_ptr<Stage> stage_;
+  std::atomic<Stage*> published_{nullptr};
+};
+
+PoseFeed::OpenTracker TheDaemon::open_tracker() {
+  return [this]() -> Result<std::unique_ptr<tracking::Tracker>> {
+    VENEER_ASSIGN(std::unique_ptr<tracking::Tracker> tracker, devices_.open_tracker(clock()));
+    if (!recorder_) return tracker;
+    return std::make_unique<RecordingTracker>(
+        std::move(tracker), *recorder_, [this](const Status& written) {
+          if (written) {
+            housekeeper_.disk_works(config_.record);
+          } else {
+            housekeeper_.disk_failed(config_.record, written.error());
+          }
+        });
+  };
+}
+
+Result<Summary> TheDaemon::run(const std::atomic<bool>& stop, Progress& progress) {
+  // Mistakes are found before any device is touched for long: opening is quick.
+  VENEER_TRY(check_files_are_there(config_));
+  const Time tracker_start = clock().now();
+  if (!config_.record.empty()) {
+    VENEER_ASSIGN(tracking::PoseRecorder recorder, tracking::PoseRecorder::create(config_.record));
+    recorder_.emplace(std::move(recorder));
   }
-  TomlReader tracker_table = toml.table("tracker");
-  const Time tracker_start = clock->now();
-  VENEER_ASSIGN(std::unique_ptr<tracking::Tracker> tracker,
-                tracking::open_tracker(tracker_table, *clock));
-  TomlReader output_table = toml.table("output");
-  VENEER_ASSIGN(const std::unique_ptr<projector::Output> output,
-                projector::open_output(output_table));
-  VENEER_TRY(toml.finish());
-  if (!config.record.empty()) {
-    VENEER_ASSIGN(tracking::PoseRecorder recorder, tracking::PoseRecorder::create(config.record));
-    tracker = std::make_unique<RecordingTracker>(std::move(tracker), std::move(recorder));
-  }
+  const PoseFeed::OpenTracker open = open_tracker();
+  VENEER_ASSIGN(std::unique_ptr<tracking::Tracker> tracker, open());
+  VENEER_ASSIGN(std::unique_ptr<projector::Output> output, devices_.open_output());
+  std::string warning;
+  tl::expected<Script, Refusal> script = read_script(config_, &warning);
+  if (!script) return tl::unexpected<Error>(std::move(script).error().error);
+  if (!warning.empty()) faults_.begin(FaultKind::kProfile, now(), warning);
 
-  VENEER_ASSIGN(const render::Scene scene, render::Scene::load(config.scene));
-  VENEER_ASSIGN(const std::unique_ptr<btf::Material> material, btf::load_material(config.material));
-  // Before it is read, so that one that comes while we start is noticed.
-  const auto known_profile = ProfileWatcher::identify(config.profile);
-  VENEER_ASSIGN(const calibration::ProfileStore::Loaded loaded,
-                calibration::ProfileStore(config.profile).load_newest_good());
-  if (!loaded.warning.empty()) spdlog::warn("{}", loaded.warning);
-  const calibration::ProjectorProfile& profile = loaded.profile;
-  VENEER_ASSIGN(const std::unique_ptr<render::Renderer> renderer,
-                render::Renderer::create(scene, *material, profile, config.render));
+  stage_ = std::make_unique<Stage>(
+      *this, open, std::move(tracker), std::move(output), *script, clock(), faults_);
+  Stage& stage = *stage_;
+  stage.loader.set_scanout(stage.output.get()->scanout());
+  stage.reloader.made_of(*script);
+  stage.loader.set_chore([this, &stage] {
+    housekeeper_.look();
+    stage.reloader.look();
+  });
+  const auto& material = *script->material;
   spdlog::info(
-      "material: {}, {} x {} texels", material->model(), material->width(), material->height());
-  spdlog::info("renderer: {}", renderer->description());
-  spdlog::info("tracker: {}", tracker->description());
-  spdlog::info("output: {}", output->description());
+      "material: {}, {} x {} texels", material.model(), material.width(), material.height());
+  VENEER_ASSIGN(std::unique_ptr<Show> show, stage.loader.begin(*std::move(script)));
+  spdlog::info("renderer: {}", show->description);
+  spdlog::info("tracker: {}", stage.poses.description());
+  spdlog::info("output: {}", stage.output.description());
 
-  std::vector<tracking::BodyId> bodies = scene.observer_bodies;
-  if (scene.object_body >= 0) bodies.push_back(scene.object_body);
-  std::ranges::sort(bodies);
-  bodies.erase(std::unique(bodies.begin(), bodies.end()), bodies.end());
-  PoseFeed poses(*tracker, *clock, config.clock, bodies, config.prediction, config.validation);
-  const render::RasterFormat raster{profile.geometry.width, profile.geometry.height, profile.bits};
-  std::optional<ProfileWatcher> profiles;
-  if (config.render.exchangeable)
-    profiles.emplace(config.profile, known_profile, raster, config.render, check_profile);
-  FrameLoop loop(
-      config, scene, raster, *clock, poses, *renderer, *output, profiles ? &*profiles : nullptr);
-  VENEER_ASSIGN(const RunRecord record, loop.run(stop, progress));
-  if (profiles) profiles->stop();
+  FrameLoop loop({config_,
+                  clock(),
+                  stage.poses,
+                  stage.output,
+                  stage.loader,
+                  faults_,
+                  board_,
+                  wishes_,
+                  devices_.before_frame},
+                 std::move(show));
+  published_ = &stage;
+  const Result<RunRecord> record = loop.run(stop, progress);
+  faults_.stopping();
+  stage.loader.stop(loop.take_show());
+  housekeeper_.tell();
+  if (!record) return tl::unexpected<Error>(record.error());
 
-  Summary summary = summarise(record);
-  summary.rejected_poses = poses.rejected();
-  summary.renderer = renderer->description();
-  summary.tracker = tracker->description();
-  summary.output = output->description();
-  summary.tracker_lost = poses.lost();
-  summary.tracker_counters = tracker->status().counters;
-  summary.tracker_events = poses.events();
-  summary.output_waits = output->waits();
-  summary.clock = config.clock == ClockKind::kVirtual ? "virtual" : "monotonic";
-  summary.settings = settings;
-  summary.bits = profile.bits;
-  if (profiles) summary.profiles = profiles->counts();
-  summary.tracker_start = tracker_start;
-  if (!config.summary.empty()) VENEER_TRY(write_summary(summary, config.summary));
-  if (!config.frame_log.empty()) VENEER_TRY(write_frame_log(record, config.frame_log));
+  Summary summary = summary_of(*record, tracker_start);
+  if (!config_.summary.empty()) VENEER_TRY(write_summary(summary, config_.summary));
+  if (!config_.frame_log.empty()) VENEER_TRY(write_frame_log(*record, config_.frame_log));
   return summary;
+}
+
+Summary TheDaemon::summary_of(const RunRecord& record, Time tracker_start) const {
+  const Stage& stage = *stage_;
+  Summary summary = summarise(record);
+  summary.rejected_poses = stage.poses.rejected();
+  summary.renderer = stage.loader.renderer_description();
+  summary.tracker = stage.poses.description();
+  summary.output = stage.output.description();
+  summary.tracker_lost = stage.poses.lost();
+  summary.tracker_counters = stage.poses.status().counters;
+  summary.tracker_events = stage.poses.events();
+  summary.output_waits = stage.output.waits();
+  summary.clock = is_virtual() ? "virtual" : "monotonic";
+  summary.settings = file_.settings;
+  summary.bits = stage.raster.bits;
+  summary.profiles = stage.loader.profile_counts();
+  summary.tracker_start = tracker_start;
+  summary.recovered_faults = faults_.recovered();
+  return summary;
+}
+
+service::ServiceStatus TheDaemon::status() const {
+  service::ServiceStatus status;
+  status.state = faults_.state();
+  status.faults = faults_.list();
+  status.recovered = faults_.recovered();
+  const FigureBoard::Figures figures = board_.last_second(now());
+  status.frames = figures.frames;
+  status.dropped = figures.dropped;
+  status.late = figures.late;
+  status.frame_rate_hz = figures.frame_rate_hz;
+  status.frame_ms_median = figures.frame_ms_median;
+  status.frame_ms_p95 = figures.frame_ms_p95;
+  status.gpu_ms_median = figures.gpu_ms_median;
+  status.latency_ms = figures.latency_ms;
+  const Stage* stage = published_;
+  if (stage == nullptr) return status;
+  const ShowLoader::Names names = stage->loader.names();
+  status.scene = names.scene;
+  status.material = names.material;
+  status.profile = names.profile;
+  status.luminance_ceiling = names.luminance_ceiling;
+  status.renderer = stage->loader.renderer_description();
+  status.output = stage->output.description();
+  const tracking::TrackerStatus tracker = stage->poses.status();
+  status.tracker = fmt::format("{}: {}{}{}",
+                               stage->poses.description(),
+                               name_of(tracker.state),
+                               tracker.detail.empty() ? "" : ": ",
+                               tracker.detail);
+  return status;
+}
+
+Result<TheDaemon::Stage*> TheDaemon::stage() const {
+  Stage* stage = published_;
+  if (stage == nullptr || faults_.state() == service::State::kStopping) {
+    return fail(Errc::kUnavailable,
+                "telling veneerd: it is {}; try again in a moment",
+                stage == nullptr ? "starting" : "stopping");
+  }
+  return stage;
+}
+
+// Only what the files do not say is changed: a reload goes back to them.
+Status TheDaemon::change(FaultKind about, std::function<Status(Script&)> edit) {
+  VENEER_ASSIGN(Stage* const stage, this->stage());
+  return stage->loader.call([this, stage, about, edit = std::move(edit)]() -> Status {
+    Script next = stage->loader.current();
+    VENEER_TRY(edit(next));
+    VENEER_TRY(stage->loader.exchange(std::move(next)));
+    stage->reloader.overridden();
+    faults_.end(about, now());
+    return {};
+  });
+}
+
+Status TheDaemon::load_material(const std::filesystem::path& material) {
+  return change(FaultKind::kMaterial, [material](Script& script) {
+    script.config.material = material;
+    return read_material(script);
+  });
+}
+
+Status TheDaemon::set_scene(const std::filesystem::path& scene) {
+  return change(FaultKind::kScene, [scene](Script& script) {
+    script.config.scene = scene;
+    return read_scene(script);
+  });
+}
+
+Status TheDaemon::set_light(int index, const service::LightSetting& light) {
+  VENEER_TRY(light.check());
+  return change(FaultKind::kScene, [index, light](Script& script) -> Status {
+    std::vector<render::Light>& lights = script.scene.lights;
+    if (index < 0 || static_cast<std::size_t>(index) >= lights.size()) {
+      return fail(Errc::kInvalidOption,
+                  "setting light {}: the scene has {}, counted from 0",
+                  index,
+                  lights.size());
+    }
+    lights[static_cast<std::size_t>(index)] = render::DirectionalLight{
+        light.direction_to_light.normalized(), light.illuminance_lux * light.colour};
+    return {};
+  });
+}
+
+Status TheDaemon::reload() {
+  VENEER_ASSIGN(Stage* const stage, this->stage());
+  return stage->loader.call([stage] { return stage->reloader.reload(); });
+}
+
+Status TheDaemon::blank(bool on) {
+  if (faults_.state() == service::State::kStopping) return stage().map([](Stage*) {});
+  wishes_.dark = on;
+  faults_.ask_for_dark(on);
+  const Stage* stage = published_;
+  // The frame loop cannot wait for itself, and a start or a lost output need not be waited for.
+  if (stage == nullptr || stage->loader.show_here() != nullptr) return {};
+  constexpr int kTries = 500;
+  for (int i = 0; i < kTries && wishes_.is_dark != on; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  return {};
+}
+
+Result<std::filesystem::path> TheDaemon::snapshot() {
+  VENEER_ASSIGN(Stage* const stage, this->stage());
+  const auto deadline = std::chrono::steady_clock::now() + ShowLoader::kPatience;
+  const std::unique_lock turn(snapshot_turn_, deadline);
+  const auto busy = [] {
+    return fail(Errc::kTimeout, "taking a snapshot: no frame was made in time; try again");
+  };
+  if (!turn) return busy();
+  Snapshot picture;
+  picture.codes = Image<Rgb16>(stage->raster.width, stage->raster.height);
+  if (const Show* show = stage->loader.show_here()) {
+    if (show->renderer && !wishes_.is_dark) show->renderer->read_codes(picture.codes.view());
+  } else {
+    wishes_.snapshot = &picture;
+    while (!picture.done.load(std::memory_order_acquire)) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      Snapshot* expected = &picture;
+      // What the frame loop has begun, it ends.
+      if (std::chrono::steady_clock::now() > deadline &&
+          wishes_.snapshot.compare_exchange_strong(expected, nullptr))
+        return busy();
+    }
+  }
+  const Result<std::filesystem::path> written = write_snapshot(
+      config_.state_directory, std::as_const(picture.codes).view(), stage->raster.bits);
+  if (!written && written.error().code == Errc::kIo)
+    housekeeper_.disk_failed(config_.state_directory / "snapshot", written.error());
+  return written;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Daemon>> Daemon::create(const std::filesystem::path& config_path,
+                                               const std::vector<std::string>& settings,
+                                               Devices devices) {
+  const ConfigFile file{config_path, settings};
+  std::optional<TomlReader> reader;
+  VENEER_ASSIGN(Config config, file.read(&reader));
+  return std::make_unique<TheDaemon>(
+      file, std::move(config), completed(std::move(devices), *reader));
 }
 
 }  // namespace veneer::daemon

@@ -7,6 +7,7 @@
 
 #include "base/clock.h"
 #include "base/result.h"
+#include "base/toml_reader.h"
 #include "btf/material.h"
 #include "calibration/profile.h"
 #include "projector/control.h"
@@ -33,6 +34,13 @@ struct Devices {
   /// Called by the frame loop before each frame, with its number and the time; may be empty. In
   /// virtual time it may call ServiceControl, which then does what it is told before it returns.
   std::function<void(std::uint64_t, Time)> before_frame;
+  /// The part of the last seconds in which programs waited for memory, 0 to 1; where it is empty,
+  /// what Linux says, and in virtual time nothing.
+  std::function<Result<double>()> memory_pressure;
 };
+
+/// What is empty is taken from the configuration: its tables [tracker], [output] and [control] as
+/// they were read, whatever became of the file since.
+[[nodiscard]] Devices completed(Devices devices, const TomlReader& toml);
 
 }  // namespace veneer::daemon

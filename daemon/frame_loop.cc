@@ -3,156 +3,391 @@
 
 #include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
+#include <time.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 namespace veneer::daemon {
+
+using namespace std::chrono_literals;
+using service::FaultKind;
+
 namespace {
 
 using SteadyTime = std::chrono::steady_clock::time_point;
 
+/// Without a sample for so long the tracker counts as out of order.
+constexpr Duration kSilence = 1s;
+/// Later than this a frame is no late one: the program stood still.
+constexpr Duration kStall = 1s;
+constexpr Duration kShortestSleep = 100ms;
+/// How often an output that did not go dark is told again.
+constexpr Duration kTellAgain = 1s;
+
+double milliseconds(Duration time) { return 1e3 * to_seconds(time); }
+
 double milliseconds_since(SteadyTime begin) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
-      .count();
+  return milliseconds(std::chrono::steady_clock::now() - begin);
+}
+
+/// What CLOCK_BOOTTIME is ahead of CLOCK_MONOTONIC: the time that the machine has slept.
+Duration time_asleep() {
+  timespec boot{};
+  timespec running{};
+  ::clock_gettime(CLOCK_BOOTTIME, &boot);
+  ::clock_gettime(CLOCK_MONOTONIC, &running);
+  return std::chrono::seconds(boot.tv_sec - running.tv_sec) +
+         std::chrono::nanoseconds(boot.tv_nsec - running.tv_nsec);
 }
 
 }  // namespace
 
-FrameLoop::FrameLoop(const Config& config,
-                     const render::Scene& scene,
-                     const render::RasterFormat& raster,
-                     Clock& clock,
-                     PoseFeed& poses,
-                     render::Renderer& renderer,
-                     projector::Output& output,
-                     ProfileWatcher* profiles)
-    : config_(config),
-      scene_(scene),
-      raster_(raster),
-      clock_(clock),
-      poses_(poses),
-      observers_(poses, scene.observer_bodies, config.presence),
-      object_(config.presence),
-      renderer_(renderer),
-      output_(output),
-      profiles_(profiles),
-      codes_(raster.width, raster.height),
-      target_(raster.width, raster.height) {}
+FrameLoop::FrameLoop(Parts parts, std::unique_ptr<Show> show)
+    : parts_(std::move(parts)),
+      show_(std::move(show)),
+      period_(from_seconds(1 / parts_.config.frame_rate_hz)) {}
 
 Status FrameLoop::wait_for_first_pose(const std::atomic<bool>& stop) {
-  constexpr Duration kStep = std::chrono::milliseconds(5);
-  const Time deadline = clock_.now() + from_seconds(config_.first_pose_timeout_s);
-  const auto observer_known = [this] { return observers_.known(clock_.now()); };
+  constexpr Duration kStep = 5ms;
+  const Time deadline = parts_.clock.now() + from_seconds(parts_.config.first_pose_timeout_s);
+  const auto observer_known = [this] { return show_->observers.known(parts_.clock.now()); };
   const auto object_known = [this] {
-    return scene_.object_body < 0 ||
-           poses_.at(scene_.object_body, clock_.now()).origin != tracking::PoseOrigin::kNone;
+    const int body = show_->script.scene.object_body;
+    return body < 0 ||
+           parts_.poses.at(body, parts_.clock.now()).origin != tracking::PoseOrigin::kNone;
   };
   while (!stop && !(observer_known() && object_known())) {
-    VENEER_TRY(poses_.health());
-    if (clock_.now() >= deadline) {
+    VENEER_TRY(parts_.poses.health());
+    if (parts_.clock.now() >= deadline) {
       return fail(
           Errc::kTimeout,
           "waiting for the first pose: none came within {} s for body {}; is the tracker on "
           "and the body in its range?",
-          config_.first_pose_timeout_s,
-          observer_known() ? fmt::format("{}", scene_.object_body)
-                           : fmt::format("{}", fmt::join(observers_.bodies(), " or ")));
+          parts_.config.first_pose_timeout_s,
+          observer_known() ? fmt::format("{}", show_->script.scene.object_body)
+                           : fmt::format("{}", fmt::join(show_->observers.bodies(), " or ")));
     }
-    poses_.advance_to(clock_.now() + kStep);
+    between_frames();
+    parts_.poses.advance_to(parts_.clock.now() + kStep);
   }
   return {};
 }
 
-Result<FrameRecord> FrameLoop::make_frame(std::uint64_t number, Time start) {
-  const SteadyTime begin = std::chrono::steady_clock::now();
-  FrameRecord record;
-  record.number = number;
-  record.display_time = start + from_seconds(config_.display_latency_ms * 1e-3);
+// --- when
 
-  const Observers::View observer = observers_.at(record.display_time);
+void FrameLoop::follow_output() {
+  projector::Output* output = parts_.output.get();
+  parts_.loader.set_scanout(output == nullptr ? nullptr : output->scanout());
+  const std::optional<Duration> refresh =
+      output != nullptr && is_real_time() ? output->refresh_period() : std::nullopt;
+  if (refresh && *refresh > Duration::zero()) {
+    pacer_.emplace(*refresh, parts_.config.latch == Latch::kLate);
+    period_ = *refresh;
+  } else if (pacer_) {
+    pacer_.reset();
+    period_ = from_seconds(1 / parts_.config.frame_rate_hz);
+    start_ = parts_.clock.now();
+  }
+}
+
+FrameLoop::Slot FrameLoop::next_slot(std::uint64_t number) {
+  const Duration latency = from_seconds(show_->script.config.display_latency_ms * 1e-3);
+  if (!pacer_) return {start_, start_ + latency};
+  const Pacer::Plan plan = pacer_->plan(number, parts_.clock.now());
+  run_.dropped += plan.skipped;
+  return {plan.wake, plan.refresh + latency};
+}
+
+void FrameLoop::start_over() {
+  if (pacer_) pacer_->start_over();
+  start_ = parts_.clock.now();
+}
+
+// CLOCK_MONOTONIC stands still while the machine sleeps, so that poses from before look fresh.
+void FrameLoop::notice_sleep() {
+  if (!is_real_time()) return;
+  const Duration asleep = time_asleep();
+  const Duration slept = asleep - std::exchange(slept_before_, asleep);
+  if (slept < kShortestSleep) return;
+  spdlog::info("the machine slept for {:.1f} s", to_seconds(slept));
+  parts_.poses.slept(slept);
+  start_over();
+}
+
+void FrameLoop::notice_tracker() {
+  const std::optional<Time> last = parts_.poses.last_sample();
+  const Time now = parts_.clock.now();
+  const bool bad = parts_.poses.lost() || !last || now - *last > kSilence;
+  if (bad == tracker_bad_) return;
+  tracker_bad_ = bad;
+  if (!bad) {
+    parts_.faults.end(FaultKind::kTracker, now);
+    return;
+  }
+  const Status health = parts_.poses.health();
+  parts_.faults.begin(
+      FaultKind::kTracker,
+      now,
+      fmt::format("{}; the picture stays as for the last pose, without highlights",
+                  health ? "no pose has come for a second: is the tracker on and in range?"
+                         : health.error().what));
+}
+
+// --- between two frames
+
+void FrameLoop::between_frames() {
+  if (show_->profiles && show_->renderer) show_->profiles->apply(*show_->renderer);
+  if (!parts_.loader.take_next(show_)) return;
+  renderer_lost_ = false;
+}
+
+// Whether there is an output, and a show that suits it.
+bool FrameLoop::keep_output() {
+  OutputKeeper& output = parts_.output;
+  if (output.failed()) {
+    parts_.loader.set_scanout(nullptr);
+    if (show_->scanout != nullptr) drop_renderer();
+    if (parts_.loader.scanout_in_use() || !output.reopen()) return false;
+    dark_ = false;
+    follow_output();
+  }
+  const Scanout* offered = output.get()->scanout();
+  if (show_->renderer && show_->scanout != offered) {
+    if (show_->scanout == nullptr && show_->refused == offered) {
+      output.get()->give_up_scanout();
+      parts_.loader.set_scanout(nullptr);
+    } else {
+      drop_renderer();  // made for another display
+    }
+  }
+  if (!show_->renderer) parts_.loader.want_renderer();
+  return true;
+}
+
+void FrameLoop::drop_renderer() {
+  show_->renderer.reset();
+  show_->scanout_use.reset();
+  show_->scanout = nullptr;
+}
+
+// --- a frame
+
+render::FrameInput FrameLoop::look(const Slot& slot, FrameRecord& record) {
+  const render::Scene& scene = show_->script.scene;
+  const Observers::View observer = show_->observers.at(slot.display);
   record.observer = observer.body;
   record.presence = observer.seen.presence;
   record.pose_age_ms = 1e3 * to_seconds(observer.estimate.age);
-  record.eye_in_world = observer.seen.world_from_body * scene_.eye_in_sensor;
+  record.eye_in_world = observer.seen.world_from_body * scene.eye_in_sensor;
   // A highlight in the wrong place tells at once that nobody knows where the eye is.
   record.specular_weight = observer.seen.certainty;
+  if (const std::optional<SampleTimes> times = parts_.poses.newest(observer.body)) {
+    record.latency_ms.tracker = milliseconds(times->arrived - times->measured);
+    record.latency_ms.hand_off = milliseconds(times->ready - times->arrived);
+    record.latency_ms.wait = std::max(0.0, milliseconds(parts_.clock.now() - times->ready));
+  }
   render::FrameInput input;
   input.eye_in_world = record.eye_in_world;
-  input.world_from_object = scene_.world_from_object;
-  input.dither_seed = static_cast<std::uint32_t>(number);
+  input.world_from_object = scene.world_from_object;
+  input.dither_seed = static_cast<std::uint32_t>(record.number);
   input.specular_weight = record.specular_weight;
-  if (scene_.object_body >= 0) {
-    const tracking::PoseEstimate object = poses_.at(scene_.object_body, record.display_time);
+  if (scene.object_body >= 0) {
+    const tracking::PoseEstimate object = parts_.poses.at(scene.object_body, slot.display);
     input.world_from_object =
-        object_.update(object, record.display_time).world_from_body * scene_.world_from_object;
+        show_->object.update(object, slot.display).world_from_body * scene.world_from_object;
   }
-  renderer_.draw(input);
+  return input;
+}
 
+FrameLoop::Made FrameLoop::make_frame(const Slot& slot, FrameRecord& record) {
+  if (!keep_output()) {
+    parts_.wishes.is_dark = true;
+    return Made::kDropped;
+  }
+  if (parts_.wishes.dark || !show_->renderer || renderer_lost_) return make_dark();
+  projector::Output& output = *parts_.output.get();
+  render::Renderer& renderer = *show_->renderer;
   projector::Frame frame;
-  frame.number = number;
-  frame.bits = raster_.bits;
+  // Before the pose is read: it may have to wait.
+  if (show_->scanout != nullptr) {
+    const Result<std::size_t> buffer = output.next_buffer();
+    if (!buffer) return made_of(parts_.output.heard(tl::unexpected<Error>(buffer.error())));
+    frame.buffer = *buffer;
+  }
+  const SteadyTime begin = std::chrono::steady_clock::now();
+  renderer.draw(look(slot, record));
+  frame.number = record.number;
+  frame.bits = show_->script.profile.bits;
   frame.display_time = record.display_time;
-  if (output_.wants_pixels(number)) {
-    renderer_.read_codes(codes_.view());
-    frame.codes = codes_.view();
+  if (frame.buffer) renderer.draw_to_scanout(*frame.buffer);
+  if (output.wants_pixels(record.number)) {
+    renderer.read_codes(show_->codes.view());
+    frame.codes = show_->codes.view();
   }
-  if (output_.wants_target(number)) {
-    renderer_.read_target(target_.view());
-    frame.target_xyz = target_.view();
+  if (output.wants_target(record.number)) {
+    renderer.read_target(show_->target.view());
+    frame.target_xyz = show_->target.view();
   }
-  renderer_.finish();
-  record.statistics = renderer_.statistics();
-  VENEER_TRY(output_.present(frame));
+  renderer.finish();
+  // What a lost GPU left in a picture may be anything.
+  if (renderer.lost()) return lose_renderer();
+  record.statistics = renderer.statistics();
+  const double drawn_ms = milliseconds_since(begin);
+  const Made made = made_of(parts_.output.present(frame));
   record.frame_ms = milliseconds_since(begin);
-  return record;
+
+  service::LatencyBudget& budget = record.latency_ms;
+  const double gpu_ms = record.statistics.gpu_ms.value_or(0);
+  budget.gpu_draw = record.statistics.draw_ms.value_or(gpu_ms);
+  budget.compensate = std::max(0.0, gpu_ms - budget.gpu_draw);
+  budget.draw = std::max(0.0, drawn_ms - gpu_ms);
+  budget.present = record.frame_ms - drawn_ms;
+  budget.display = std::max(0.0, milliseconds(record.display_time - parts_.clock.now()));
+  if (pacer_) pacer_->took(std::chrono::steady_clock::now() - begin);
+  if (made == Made::kShown) {
+    dark_ = false;
+    parts_.wishes.is_dark = false;
+    parts_.faults.end(FaultKind::kGpu, parts_.clock.now());
+  }
+  give_snapshot(false);
+  return made;
+}
+
+FrameLoop::Made FrameLoop::made_of(OutputKeeper::Outcome outcome) {
+  switch (outcome) {
+    case OutputKeeper::Outcome::kDone:
+      return Made::kShown;
+    case OutputKeeper::Outcome::kDropped:
+      return Made::kDropped;
+    case OutputKeeper::Outcome::kClosed:
+      return Made::kClosed;
+  }
+  return Made::kDropped;
+}
+
+FrameLoop::Made FrameLoop::make_dark() {
+  const Time now = parts_.clock.now();
+  if (!dark_ && now - dark_told_ >= (dark_failed_ ? kTellAgain : Duration::zero())) {
+    dark_told_ = now;
+    const OutputKeeper::Outcome outcome = parts_.output.blank();
+    if (outcome == OutputKeeper::Outcome::kClosed) return Made::kClosed;
+    dark_ = outcome == OutputKeeper::Outcome::kDone;
+    dark_failed_ = !dark_;
+  }
+  give_snapshot(true);
+  parts_.wishes.is_dark = dark_;
+  return dark_ ? Made::kDark : Made::kDropped;
+}
+
+FrameLoop::Made FrameLoop::lose_renderer() {
+  renderer_lost_ = true;
+  const Made made = make_dark();
+  parts_.faults.begin(FaultKind::kGpu,
+                      parts_.clock.now(),
+                      "the GPU was reset and has forgotten everything; dark until another renderer "
+                      "is made");
+  parts_.loader.want_renderer();
+  return made;
+}
+
+void FrameLoop::give_snapshot(bool dark) {
+  if (parts_.wishes.snapshot.load(std::memory_order_relaxed) == nullptr) return;
+  Snapshot* snapshot = parts_.wishes.snapshot.exchange(nullptr);
+  if (snapshot == nullptr) return;
+  const render::RasterFormat raster = show_->script.raster();
+  if (!dark && snapshot->codes.width() == raster.width && snapshot->codes.height() == raster.height)
+    show_->renderer->read_codes(snapshot->codes.view());
+  snapshot->done.store(true, std::memory_order_release);
+}
+
+void FrameLoop::account(const Slot& slot, Made made, FrameRecord& record) {
+  ++run_.count;
+  FrameFigures figures;
+  if (made == Made::kShown) {
+    if (run_.frames.size() < kRememberedFrames) {
+      run_.frames.push_back(record);
+    } else {
+      run_.frames[seen_ % kRememberedFrames] = record;
+    }
+    ++seen_;
+    if (record.presence > tracking::Presence::kTracked) ++run_.held;
+    if (record.presence == tracking::Presence::kLost) ++run_.lost;
+    if (record.frame_ms > milliseconds(period_)) figures.late = true;
+  } else if (made == Made::kDropped) {
+    ++run_.dropped;
+  }
+  if (made != Made::kClosed && !first_made_ && made != Made::kDropped) {
+    first_made_ = true;
+    parts_.faults.first_frame();
+  }
+  if (pacer_) {
+    projector::Output* output = parts_.output.get();
+    const auto seen = output == nullptr ? std::nullopt : output->last_presented();
+    if (seen && pacer_->shown(seen->number, seen->time)) figures.late = true;
+  } else {
+    // The next frame starts on the next period that has not begun yet; those in between are lost.
+    start_ += period_;
+    if (const Time now = parts_.clock.now(); now > start_) {
+      const auto missed = (now - start_) / period_ + 1;
+      run_.dropped += static_cast<std::uint64_t>(missed);
+      start_ += missed * period_;
+    }
+  }
+  if (figures.late) ++run_.late;
+  if (parts_.clock.now() - slot.wake > kStall) start_over();
+  figures.done = parts_.clock.now();
+  figures.frame_ms = record.frame_ms;
+  if (record.statistics.gpu_ms) figures.gpu_ms = *record.statistics.gpu_ms;
+  figures.dark = made != Made::kShown;
+  figures.dropped = run_.dropped;
+  figures.late_total = run_.late;
+  figures.latency_ms = record.latency_ms;
+  parts_.board.post(figures);
 }
 
 Result<RunRecord> FrameLoop::run(const std::atomic<bool>& stop, Progress& progress) {
+  slept_before_ = time_asleep();
+  follow_output();
   VENEER_TRY(wait_for_first_pose(stop));
-  RunRecord run;
-  run.frames.reserve(kRememberedFrames);
-  const Duration period = from_seconds(1 / config_.frame_rate_hz);
+  const std::uint64_t frames = parts_.config.frames;
+  run_.frames.reserve(kRememberedFrames);
   const SteadyTime begin = std::chrono::steady_clock::now();
-  if (config_.frames > 0) progress.start("frames", static_cast<std::int64_t>(config_.frames));
-  Time start = clock_.now();
-  for (std::uint64_t number = 0; !stop && (config_.frames == 0 || number < config_.frames);
-       ++number) {
-    poses_.advance_to(start);
-    VENEER_ASSIGN(const FrameRecord record, make_frame(number, start));
-    if (run.count++ < kRememberedFrames) {
-      run.frames.push_back(record);
-    } else {
-      run.frames[number % kRememberedFrames] = record;
-    }
-    if (record.presence > tracking::Presence::kTracked) ++run.held;
-    if (record.presence == tracking::Presence::kLost) ++run.lost;
-    if (!tracker_lost_ && poses_.lost()) {
-      tracker_lost_ = true;
-      spdlog::warn("{}; the picture stays as for the last pose", poses_.health().error().what);
-    }
-    if (record.frame_ms > 1e3 * to_seconds(period)) ++run.late;
+  if (frames > 0) progress.start("frames", static_cast<std::int64_t>(frames));
+  start_ = parts_.clock.now();
+  for (std::uint64_t number = 0; !stop && (frames == 0 || number < frames); ++number) {
+    if (!is_real_time()) parts_.loader.serve_now(show_);
+    const Slot slot = next_slot(number);
+    parts_.poses.advance_to(slot.wake);
+    if (parts_.before_frame) parts_.before_frame(number, parts_.clock.now());
+    notice_sleep();
+    FrameRecord record;
+    record.number = number;
+    record.display_time = slot.display;
+    const Made made = make_frame(slot, record);
+    if (made == Made::kClosed) break;
+    notice_tracker();
+    account(slot, made, record);
     // In the time that is left of the period.
-    if (profiles_ != nullptr) profiles_->apply(renderer_);
-    // The next frame starts on the next period that has not begun yet; those in between are lost.
-    start += period;
-    if (const Time now = clock_.now(); now > start) {
-      const auto missed = (now - start) / period + 1;
-      run.dropped += static_cast<std::uint64_t>(missed);
-      start += missed * period;
-    }
-    if (config_.frames > 0) progress.advance(1);
+    between_frames();
+    if (frames > 0) progress.advance(1);
   }
-  if (config_.frames > 0) progress.finish({});
-  run.seconds = milliseconds_since(begin) * 1e-3;
-  if (run.count > kRememberedFrames) {
+  if (frames > 0) progress.finish({});
+  run_.seconds = milliseconds_since(begin) * 1e-3;
+  if (seen_ > kRememberedFrames) {
     std::ranges::rotate(
-        run.frames,
-        run.frames.begin() + static_cast<std::ptrdiff_t>(run.count % kRememberedFrames));
+        run_.frames, run_.frames.begin() + static_cast<std::ptrdiff_t>(seen_ % kRememberedFrames));
   }
-  VENEER_TRY(output_.finish());
-  return run;
+  parts_.faults.stopping();
+  // Somebody asked for these frames and is to know that he does not have them.
+  if (frames > 0) VENEER_TRY(parts_.output.last());
+  if (projector::Output* output = parts_.output.get()) {
+    const Status finished = output->finish();
+    if (frames > 0) VENEER_TRY(finished);
+  }
+  return std::move(run_);
 }
 
 }  // namespace veneer::daemon

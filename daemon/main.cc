@@ -5,7 +5,9 @@
 #include <spdlog/spdlog.h>
 
 #include <atomic>
+#include <chrono>
 #include <csignal>
+#include <thread>
 
 #include "base/exit_code.h"
 #include "daemon/daemon.h"
@@ -18,9 +20,9 @@ static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler sets it"
 
 void request_stop(int) { stop_requested = true; }
 
-std::atomic<bool> profile_check_requested{false};
+std::atomic<bool> reload_requested{false};
 
-void request_profile_check(int) { profile_check_requested = true; }
+void request_reload(int) { reload_requested = true; }
 
 }  // namespace
 
@@ -56,17 +58,31 @@ int main(int argc, char** argv) {
   action.sa_handler = request_stop;
   sigaction(SIGTERM, &action, nullptr);
   sigaction(SIGINT, &action, nullptr);
-  action.sa_handler = request_profile_check;
+  action.sa_handler = request_reload;
   sigaction(SIGHUP, &action, nullptr);
 
   SilentProgress silent;
   const std::unique_ptr<Progress> progress = quiet ? nullptr : make_progress();
+  Result<std::unique_ptr<daemon::Daemon>> daemon = daemon::Daemon::create(config, settings);
+  if (!daemon) {
+    spdlog::error("{}", daemon.error().what);
+    return exit_code_of(daemon.error());
+  }
+  service::ServiceControl& control = **daemon;
+  // A signal handler can only set a flag, and a reload may take seconds.
+  std::jthread reloader([&control](const std::stop_token& stop) {
+    constexpr std::chrono::milliseconds kFlagInterval{50};
+    while (!stop.stop_requested()) {
+      std::this_thread::sleep_for(kFlagInterval);
+      if (!reload_requested.exchange(false)) continue;
+      if (const Status status = control.reload(); !status)
+        spdlog::warn("the reload is refused, all stays as it is: {}", status.error().what);
+    }
+  });
+  // Here start what speaks of `control` to the world: the bus, the notifier, the metrics
+  // (Config::service).
   const Result<daemon::Summary> summary =
-      daemon::run(config,
-                  settings,
-                  stop_requested,
-                  quiet ? static_cast<Progress&>(silent) : *progress,
-                  &profile_check_requested);
+      (*daemon)->run(stop_requested, quiet ? static_cast<Progress&>(silent) : *progress);
   if (!summary) {
     spdlog::error("{}", summary.error().what);
     return exit_code_of(summary.error());

@@ -13,8 +13,11 @@ namespace {
 
 using SteadyClockPoint = std::chrono::steady_clock::time_point;
 
-// A signal handler can only set a flag, so that the watcher looks at it this often.
+// How long one that was asked for, or was used, may wait for the watcher.
 constexpr std::chrono::milliseconds kFlagInterval{50};
+// One that takes another's place may be missing for one look, on file systems that cannot exchange
+// two names.
+constexpr int kMissingLooks = 3;
 
 double milliseconds_since(SteadyClockPoint begin) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
@@ -41,12 +44,12 @@ ProfileWatcher::ProfileWatcher(std::filesystem::path folder,
                                const std::optional<Identity>& known,
                                const render::RasterFormat& raster,
                                const render::RendererOptions& options,
-                               std::atomic<bool>* check_now,
+                               std::function<void(const Status&)> heard,
                                const WatchOptions& watch)
     : folder_(std::move(folder)),
       raster_(raster),
       options_(options),
-      check_now_(check_now),
+      heard_(std::move(heard)),
       interval_(watch.interval),
       watcher_([this, known](const std::stop_token& stop) { this->watch(stop, known); }) {}
 
@@ -59,6 +62,26 @@ ProfileWatcher::~ProfileWatcher() {
 void ProfileWatcher::refuse(const Error& error) {
   ++refusals_;
   spdlog::warn("the new projector profile is refused, the old one stays: {}", error.what);
+  answer(tl::unexpected<Error>(error));
+}
+
+void ProfileWatcher::answer(const Status& status) {
+  if (heard_) heard_(status);
+  {
+    const std::scoped_lock lock(answer_mutex_);
+    ++answers_;
+    last_answer_ = status;
+  }
+  answered_.notify_all();
+}
+
+Status ProfileWatcher::check(std::chrono::milliseconds patience) {
+  std::unique_lock lock(answer_mutex_);
+  const std::uint64_t before = answers_;
+  asked_ = true;
+  if (!answered_.wait_for(lock, patience, [&] { return answers_ != before; }))
+    return fail(Errc::kTimeout, "reading the projector profile anew: no frame took it in time");
+  return last_answer_;
 }
 
 // Prepares what is in the folder and leaves it for the frame loop; false where the folder was
@@ -95,19 +118,33 @@ void ProfileWatcher::dispose_of_used() {
   ++reloads_;
   longest_swap_ms_ = std::max(longest_swap_ms_.load(), used->swap_ms);
   spdlog::info("the projector profile was exchanged in {:.1f} ms", used->swap_ms);
+  answer({});
 }
 
 void ProfileWatcher::watch(const std::stop_token& stop, std::optional<Identity> known) {
+  int missing = 0;
   SteadyClockPoint looked = std::chrono::steady_clock::now();
   while (!stop.stop_requested()) {
     std::this_thread::sleep_for(std::min(kFlagInterval, interval_));
     dispose_of_used();
-    const bool asked = check_now_ != nullptr && check_now_->exchange(false);
+    const bool asked = asked_.exchange(false);
     const SteadyClockPoint now = std::chrono::steady_clock::now();
     if (!asked && now - looked < interval_) continue;
     looked = now;
     const std::optional<Identity> found = identify(folder_);
-    if (!found || (found == known && !asked)) continue;
+    if (!found) {
+      if (asked || ++missing == kMissingLooks) {
+        missing = kMissingLooks;
+        answer(fail(Errc::kNotFound,
+                    "looking at the projector profile: there is no {}; the one that was read is "
+                    "still used; put it back or calibrate",
+                    (folder_ / "profile.json").string()));
+      }
+      continue;
+    }
+    if (missing >= kMissingLooks && found == known) answer({});
+    missing = 0;
+    if (found == known && !asked) continue;
     if (read(*found)) known = found;
   }
   dispose_of_used();

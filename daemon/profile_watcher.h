@@ -3,8 +3,11 @@
 
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <mutex>
 #include <optional>
 #include <stop_token>
 #include <thread>
@@ -49,19 +52,21 @@ class ProfileWatcher {
 
   /// @param known  what stood in the folder before the renderer's profile was read from it.
   /// @param raster, options  the renderer's.
-  /// @param check_now  borrowed, may be null: once true, the folder is read at once, changed or
-  /// not,
-  ///                   and the flag is cleared.
+  /// @param heard  called by the watching thread with what became of a profile, or with kNotFound
+  ///               once where the folder has been without one for a while; may be empty.
   ProfileWatcher(std::filesystem::path folder,
                  const std::optional<Identity>& known,
                  const render::RasterFormat& raster,
                  const render::RendererOptions& options,
-                 std::atomic<bool>* check_now,
+                 std::function<void(const Status&)> heard,
                  const WatchOptions& watch = {});
   ~ProfileWatcher();
   ProfileWatcher(const ProfileWatcher&) = delete;
   ProfileWatcher& operator=(const ProfileWatcher&) = delete;
 
+  /// Reads the folder, changed or not, and waits until frames are drawn with what is there.
+  /// Errors: why it was refused; kTimeout where no frame took it within `patience`.
+  [[nodiscard]] Status check(std::chrono::milliseconds patience);
   /// For the frame loop: gives a newly prepared profile, if there is one, to the renderer. Never
   /// waits, and allocates only what GL does.
   void apply(render::Renderer& renderer);
@@ -75,15 +80,21 @@ class ProfileWatcher {
   [[nodiscard]] bool read(const Identity& found);
   void dispose_of_used();
   void refuse(const Error& error);
+  void answer(const Status& status);
 
   const std::filesystem::path folder_;
   const render::RasterFormat raster_;
   const render::RendererOptions options_;
-  std::atomic<bool>* const check_now_;
+  const std::function<void(const Status&)> heard_;
   const std::chrono::milliseconds interval_;
   // Owned by whoever exchanges them for null: to the frame loop, and back from it.
   std::atomic<HandOver*> prepared_{nullptr};
   std::atomic<HandOver*> used_{nullptr};
+  std::atomic<bool> asked_{false};
+  std::mutex answer_mutex_;
+  std::condition_variable answered_;
+  std::uint64_t answers_ = 0;
+  Status last_answer_;
   std::atomic<std::uint64_t> reloads_{0};
   std::atomic<std::uint64_t> refusals_{0};
   std::atomic<double> longest_swap_ms_{0};

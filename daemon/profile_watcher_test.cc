@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <functional>
+#include <future>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -61,7 +62,7 @@ class ProfileWatcherTest : public testing::Test {
             ProfileWatcher::identify(store_.folder()),
             {16, 12, 8},
             {},
-            &check_now_,
+            [this](const Status& status) { heard_.push_back(status.has_value()); },
             {interval}};
   }
   /// Draws frames until `done`; false if that takes a minute, which is enough on any machine.
@@ -76,7 +77,7 @@ class ProfileWatcherTest : public testing::Test {
   TemporaryFolder folder_;
   calibration::ProfileStore store_{folder_.path() / "profile"};
   RememberingRenderer renderer_;
-  std::atomic<bool> check_now_{false};
+  std::vector<bool> heard_;  // of the watching thread until it has stopped
 };
 
 TEST_F(ProfileWatcherTest, GivesEveryNewProfileToTheRenderer) {
@@ -105,7 +106,7 @@ TEST_F(ProfileWatcherTest, LeavesTheRendererAloneWhileNothingChanges) {
 TEST_F(ProfileWatcherTest, SeesOneThatCameBeforeItBegan) {
   const auto known = ProfileWatcher::identify(store_.folder());
   ASSERT_TRUE(store_.publish(profile_at(2)));
-  ProfileWatcher watcher(store_.folder(), known, {16, 12, 8}, {}, nullptr, {2ms});
+  ProfileWatcher watcher(store_.folder(), known, {16, 12, 8}, {}, {}, {2ms});
   EXPECT_TRUE(frames_until(watcher, [&] { return renderer_.distances == std::vector{2.0}; }));
 }
 
@@ -151,11 +152,35 @@ TEST_F(ProfileWatcherTest, WaitsWhileThereIsNoProfile) {
 TEST_F(ProfileWatcherTest, ReadsAtOnceWhenAskedEvenWhatDidNotChange) {
   ProfileWatcher watcher = watch(1h);
   ASSERT_TRUE(store_.publish(profile_at(2)));
-  check_now_ = true;
-  ASSERT_TRUE(frames_until(watcher, [&] { return renderer_.distances == std::vector{2.0}; }));
-  EXPECT_FALSE(check_now_);
-  check_now_ = true;
-  EXPECT_TRUE(frames_until(watcher, [&] { return renderer_.distances == std::vector{2.0, 2.0}; }));
+  for (const std::size_t times : {1U, 2U}) {
+    auto answer = std::async(std::launch::async, [&] { return watcher.check(60s); });
+    ASSERT_TRUE(
+        frames_until(watcher, [&] { return answer.wait_for(0s) == std::future_status::ready; }));
+    EXPECT_TRUE(answer.get());
+    EXPECT_EQ(renderer_.distances, std::vector(times, 2.0));
+  }
+}
+
+TEST_F(ProfileWatcherTest, SaysWhyWhatWasAskedForIsRefused) {
+  ProfileWatcher watcher = watch(1h);
+  ASSERT_TRUE(store_.publish(profile_at(2, 17)));
+  const Status refused = watcher.check(60s);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, Errc::kInvalidOption);
+  ASSERT_TRUE(store_.publish(profile_at(2)));
+  const Status nobody_draws = watcher.check(300ms);
+  ASSERT_FALSE(nobody_draws);
+  EXPECT_EQ(nobody_draws.error().code, Errc::kTimeout);
+}
+
+TEST_F(ProfileWatcherTest, SaysOnceThatTheFolderIsGoneAndThatItIsBack) {
+  ProfileWatcher watcher = watch();
+  std::filesystem::rename(store_.folder(), folder_.path() / "away");
+  std::this_thread::sleep_for(100ms);
+  std::filesystem::rename(folder_.path() / "away", store_.folder());
+  std::this_thread::sleep_for(100ms);
+  watcher.stop();
+  EXPECT_EQ(heard_, (std::vector{false, true}));
 }
 
 TEST_F(ProfileWatcherTest, TheNewestOvertakesOneThatNoFrameTook) {

@@ -27,6 +27,20 @@ nlohmann::ordered_json json_of(const tracking::TrackerCounters& counters) {
   };
 }
 
+nlohmann::ordered_json json_of(const service::LatencyBudget& budget) {
+  return {
+      {"tracker", budget.tracker},
+      {"hand_off", budget.hand_off},
+      {"wait", budget.wait},
+      {"draw", budget.draw},
+      {"gpu_draw", budget.gpu_draw},
+      {"compensate", budget.compensate},
+      {"present", budget.present},
+      {"display", budget.display},
+      {"total", budget.total()},
+  };
+}
+
 nlohmann::ordered_json json_of(const std::vector<TrackerEvent>& events) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const TrackerEvent& event : events) {
@@ -43,9 +57,11 @@ Summary summarise(const RunRecord& run) {
   Summary summary;
   std::vector<double> frame_ms;
   std::vector<double> pose_age_ms;
+  std::vector<service::LatencyBudget> budgets;
   double covered = 0;
   for (const FrameRecord& frame : run.frames) {
     frame_ms.push_back(frame.frame_ms);
+    budgets.push_back(frame.latency_ms);
     pose_age_ms.push_back(frame.pose_age_ms);
     const auto pixels = static_cast<double>(frame.statistics.covered_pixels);
     covered += pixels;
@@ -64,6 +80,7 @@ Summary summarise(const RunRecord& run) {
   summary.frame_ms_p99 = quantile(frame_ms, 0.99);
   summary.pose_age_ms_p50 = quantile(pose_age_ms, 0.5);
   summary.pose_age_ms_p99 = quantile(pose_age_ms, 0.99);
+  summary.latency_ms = medians(budgets);
   summary.dropped = run.dropped;
   summary.late = run.late;
   summary.held = run.held;
@@ -116,6 +133,8 @@ Status write_summary(const Summary& summary, const std::filesystem::path& path) 
       {"profile_reloads", summary.profiles.reloads},
       {"profile_refusals", summary.profiles.refusals},
       {"profile_swap_ms_max", summary.profiles.longest_swap_ms},
+      {"latency_ms", json_of(summary.latency_ms)},
+      {"recovered_faults", summary.recovered_faults},
       {"tracker_start_ns", summary.tracker_start.time_since_epoch().count()},
   };
   return write_text(path, json.dump(2) + "\n");
@@ -125,23 +144,34 @@ Status write_frame_log(const RunRecord& run, const std::filesystem::path& path) 
   std::string text =
       "frame,display_time_ns,frame_ms,gpu_ms,pose_age_ms,eye_x,eye_y,eye_z,covered,out_of_gamut,"
       "observer,"
-      "presence,specular_weight\n";
+      "presence,specular_weight,tracker_ms,hand_off_ms,wait_ms,draw_ms,gpu_draw_ms,compensate_ms,"
+      "present_ms,display_ms\n";
   for (const FrameRecord& frame : run.frames) {
     const std::optional<double>& gpu_ms = frame.statistics.gpu_ms;
-    text += fmt::format("{},{},{:.4f},{},{:.4f},{:.6f},{:.6f},{:.6f},{},{},{},{},{:.4f}\n",
-                        frame.number,
-                        frame.display_time.time_since_epoch().count(),
-                        frame.frame_ms,
-                        gpu_ms ? fmt::format("{:.4f}", *gpu_ms) : "",
-                        frame.pose_age_ms,
-                        frame.eye_in_world.x(),
-                        frame.eye_in_world.y(),
-                        frame.eye_in_world.z(),
-                        frame.statistics.covered_pixels,
-                        frame.statistics.out_of_gamut_pixels,
-                        frame.observer,
-                        name_of(frame.presence),
-                        frame.specular_weight);
+    text += fmt::format(
+        "{},{},{:.4f},{},{:.4f},{:.6f},{:.6f},{:.6f},{},{},{},{},{:.4f},"
+        "{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f}\n",
+        frame.number,
+        frame.display_time.time_since_epoch().count(),
+        frame.frame_ms,
+        gpu_ms ? fmt::format("{:.4f}", *gpu_ms) : "",
+        frame.pose_age_ms,
+        frame.eye_in_world.x(),
+        frame.eye_in_world.y(),
+        frame.eye_in_world.z(),
+        frame.statistics.covered_pixels,
+        frame.statistics.out_of_gamut_pixels,
+        frame.observer,
+        name_of(frame.presence),
+        frame.specular_weight,
+        frame.latency_ms.tracker,
+        frame.latency_ms.hand_off,
+        frame.latency_ms.wait,
+        frame.latency_ms.draw,
+        frame.latency_ms.gpu_draw,
+        frame.latency_ms.compensate,
+        frame.latency_ms.present,
+        frame.latency_ms.display);
   }
   return write_text(path, text);
 }

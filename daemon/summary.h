@@ -33,11 +33,13 @@ struct Summary {
   std::string renderer;
   std::string tracker;
   std::string output;
-  std::string clock;                  ///< "monotonic" or "virtual"
-  std::vector<std::string> settings;  ///< that replaced values of the configuration
-  int bits = 0;                       ///< of a drive code
-  ProfileCounts profiles;             ///< that appeared during the run
-  Time tracker_start;                 ///< time zero of a simulated tracker's paths
+  std::string clock;                   ///< "monotonic" or "virtual"
+  std::vector<std::string> settings;   ///< that replaced values of the configuration
+  int bits = 0;                        ///< of a drive code
+  ProfileCounts profiles;              ///< that appeared during the run
+  service::LatencyBudget latency_ms;   ///< medians over the remembered frames
+  std::uint64_t recovered_faults = 0;  ///< that were overcome
+  Time tracker_start;                  ///< time zero of a simulated tracker's paths
 };
 
 [[nodiscard]] Summary summarise(const RunRecord& run);
@@ -46,7 +48,8 @@ struct Summary {
 /// Written whole or not at all.
 [[nodiscard]] Status write_summary(const Summary& summary, const std::filesystem::path& path);
 /// CSV: frame, display_time_ns, frame_ms, gpu_ms, pose_age_ms, eye x, y, z, pixels covered and out
-/// of gamut, observer (a body), his presence, specular_weight.
+/// of gamut, observer (a body), his presence, specular_weight, and the parts
+/// of the latency in milliseconds (service::LatencyBudget).
 [[nodiscard]] Status write_frame_log(const RunRecord& run, const std::filesystem::path& path);
 
 }  // namespace veneer::daemon

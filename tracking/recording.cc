@@ -98,10 +98,16 @@ Status PoseRecorder::write_line(const std::string& line) {
     const ssize_t count = ::write(file_.value(), text.data() + done, text.size() - done);
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) {
+      // What there was room for; the next line begins where this one did.
+      const int reason = errno;
+      const off_t end = ::lseek(file_.value(), 0, SEEK_CUR);
+      if (done > 0 && end >= static_cast<off_t>(done) &&
+          ::ftruncate(file_.value(), end - static_cast<off_t>(done)) == 0)
+        ::lseek(file_.value(), end - static_cast<off_t>(done), SEEK_SET);
       return fail(Errc::kIo,
                   "recording poses to {}: {}; free some space or record elsewhere",
                   path_.string(),
-                  std::strerror(errno));
+                  std::strerror(reason));
     }
     done += static_cast<std::size_t>(count);
   }

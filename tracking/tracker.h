@@ -21,6 +21,9 @@ class Tracker {
   /// was unplugged is waited for: that is a timeout too, and status() tells. Errors: kTimeout (try
   /// again), kDisconnected (final; open again).
   [[nodiscard]] virtual Result<PoseSample> wait_pose(Duration timeout) = 0;
+  /// Whether it ends by itself, as a recording does: kDisconnected is then its end and no fault,
+  /// and opening it again would play it again.
+  [[nodiscard]] virtual bool ends() const { return false; }
   /// How it is doing. Any thread may ask; it may have to wait for a moment.
   [[nodiscard]] virtual TrackerStatus status() const { return {}; }
 };

@@ -41,6 +41,7 @@ class ReplayTracker final : public Tracker {
 
   /// Says so where the recording's last line was cut short.
   [[nodiscard]] std::string description() const override;
+  [[nodiscard]] bool ends() const override { return !options_.loop; }
   /// kDisconnected after the last sample, unless it loops.
   [[nodiscard]] Result<PoseSample> wait_pose(Duration timeout) override;
 

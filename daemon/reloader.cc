@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/reloader.h"
+
+#include <sys/stat.h>
+
+#include <utility>
+
+namespace veneer::daemon {
+
+using service::FaultKind;
+
+namespace {
+
+constexpr Duration kLookInterval = std::chrono::seconds(1);
+
+}  // namespace
+
+Result<Config> ConfigFile::read(std::optional<TomlReader>* reader) const {
+  VENEER_ASSIGN(TomlReader toml, TomlReader::open(path, settings));
+  VENEER_ASSIGN(Config config, Config::read(toml));
+  VENEER_TRY(toml.finish());
+  // On a virtual clock a run is repeatable, so that nothing may come in between.
+  config.render.exchangeable = config.clock == ClockKind::kMonotonic;
+  if (reader != nullptr) *reader = std::move(toml);
+  return config;
+}
+
+Reloader::Reloader(ConfigFile file, ShowLoader& loader, Faults& faults, Clock& clock)
+    : file_(std::move(file)), loader_(loader), faults_(faults), clock_(clock) {}
+
+std::optional<Reloader::Stamp> Reloader::stamp_of(const std::filesystem::path& file) {
+  struct stat status {};
+  if (::stat(file.c_str(), &status) != 0) return std::nullopt;
+  return Stamp{
+      status.st_dev, status.st_ino, status.st_mtim.tv_sec, status.st_mtim.tv_nsec, status.st_size};
+}
+
+// The profile has a watcher of its own; where it is refused, its folder is among them by then.
+Reloader::Stamps Reloader::stamps_of(const std::filesystem::path& config, const Script& script) {
+  Stamps stamps;
+  for (const std::filesystem::path& file :
+       {config,
+        script.config.scene,
+        script.config.material,
+        script.config.scene.parent_path() / script.scene.mesh_name}) {
+    stamps[file] = stamp_of(file);
+  }
+  return stamps;
+}
+
+void Reloader::made_of(const Script& script) {
+  shown_ = stamps_of(file_.path, script);
+  overridden_ = false;
+}
+
+Status Reloader::refuse(FaultKind kind, const Error& error) {
+  faults_.begin(kind,
+                clock_.now(),
+                fmt::format("{}; what was read before stays until it is right", error.what));
+  return tl::unexpected<Error>(error);
+}
+
+Status Reloader::reload() {
+  Status status = read_all();
+  if (status) {
+    refused_.reset();
+    for (const FaultKind kind :
+         {FaultKind::kConfiguration, FaultKind::kScene, FaultKind::kMaterial, FaultKind::kProfile})
+      faults_.end(kind, clock_.now());
+  }
+  return status;
+}
+
+Status Reloader::read_all() {
+  // Before they are read, so that what comes meanwhile is noticed.
+  refused_ = stamps_of(file_.path, loader_.current());
+  const Result<Config> config = file_.read();
+  if (!config) return refuse(FaultKind::kConfiguration, config.error());
+  Script named = loader_.current();
+  named.config = *config;
+  for (const auto& [file, stamp] : stamps_of(file_.path, named)) (*refused_)[file] = stamp;
+  (*refused_)[config->profile / "profile.json"] = stamp_of(config->profile / "profile.json");
+
+  const Config& now = loader_.current().config;
+  const bool same_files =
+      !overridden_ && now.profile == config->profile && stamps_of(file_.path, named) == shown_;
+  if (same_files) {
+    const Status checked = loader_.check_profile();
+    // Its watcher tries again by itself.
+    refused_.reset();
+    return checked ? checked : refuse(FaultKind::kProfile, checked.error());
+  }
+  Script next = loader_.current();
+  next.config.scene = config->scene;
+  next.config.material = config->material;
+  next.config.profile = config->profile;
+  next.config.render = config->render;
+  next.config.presence = config->presence;
+  next.config.display_latency_ms = config->display_latency_ms;
+  const Stamps stamps = stamps_of(file_.path, named);
+  if (const Status read = read_scene(next); !read) return refuse(FaultKind::kScene, read.error());
+  if (const Status read = read_material(next); !read)
+    return refuse(FaultKind::kMaterial, read.error());
+  std::string warning;
+  if (const Status read = read_profile(next, &warning); !read)
+    return refuse(FaultKind::kProfile, read.error());
+  if (!warning.empty()) return refuse(FaultKind::kProfile, Error{Errc::kBadFormat, warning});
+  if (const Status fits = render::check_exchangeable(loader_.current().raster(), next.profile);
+      !fits)
+    return refuse(FaultKind::kProfile, fits.error());
+  if (const Status exchanged = loader_.exchange(next); !exchanged)
+    return refuse(FaultKind::kConfiguration, exchanged.error());
+  made_of(next);
+  return {};
+}
+
+void Reloader::look() {
+  const Time now = clock_.now();
+  if (!refused_ || now < due_) return;
+  due_ = now + kLookInterval;
+  bool changed = false;
+  for (const auto& [file, stamp] : *refused_) changed |= stamp_of(file) != stamp;
+  if (changed) (void)reload();
+}
+
+}  // namespace veneer::daemon

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "daemon/faults.h"
+#include "daemon/show_loader.h"
+
+namespace veneer::daemon {
+
+/// Where the configuration comes from, now and when it is read again.
+struct ConfigFile {
+  std::filesystem::path path;
+  std::vector<std::string> settings;  ///< "key = value" lines that replace what the file says
+
+  /// Reads and checks it. Errors: kNotFound, kIo, kInvalidOption.
+  [[nodiscard]] Result<Config> read(std::optional<TomlReader>* reader = nullptr) const;
+};
+
+/// Reads the files again that a show was made of. What is bad is refused, is a fault from then on,
+/// and is tried again whenever one of the files changes, until it is good. All of it runs on the
+/// loader's thread.
+///
+/// The scene, the material, the profile and the tables [render] and [presence] are taken from the
+/// new files, and display_latency_ms is; all else says how the daemon starts. What a call had set
+/// (a material, a scene, a light) gives way to what the files say.
+class Reloader {
+ public:
+  /// Borrows all but the file.
+  Reloader(ConfigFile file, ShowLoader& loader, Faults& faults, Clock& clock);
+
+  /// The files of a show that was just made.
+  void made_of(const Script& script);
+  /// Something else than the files say is shown now.
+  void overridden() { overridden_ = true; }
+  /// Errors: why it was refused; what is shown stays.
+  [[nodiscard]] Status reload();
+  /// Tries again what was refused, where a file has changed since; for every now and then.
+  void look();
+
+ private:
+  struct Stamp {
+    std::uint64_t device = 0;
+    std::uint64_t file = 0;
+    std::int64_t seconds = 0;
+    std::int64_t nanoseconds = 0;
+    std::int64_t bytes = 0;
+    bool operator==(const Stamp&) const = default;
+  };
+  using Stamps = std::map<std::filesystem::path, std::optional<Stamp>>;
+  [[nodiscard]] static Stamps stamps_of(const std::filesystem::path& config, const Script& script);
+  [[nodiscard]] static std::optional<Stamp> stamp_of(const std::filesystem::path& file);
+  [[nodiscard]] Status read_all();
+  [[nodiscard]] Status refuse(service::FaultKind kind, const Error& error);
+
+  const ConfigFile file_;
+  ShowLoader& loader_;
+  Faults& faults_;
+  Clock& clock_;
+  Stamps shown_;                   // of what is shown
+  std::optional<Stamps> refused_;  // of what was refused last
+  bool overridden_ = false;
+  Time due_;
+};
+
+}  // namespace veneer::daemon
