@@ -29,13 +29,13 @@ std::filesystem::path state_directory_of_the_unit() {
   return all.substr(0, all.find(':'));
 }
 
-void read_service(TomlReader toml, ServiceOptions& service) {
+void read_service(TomlReader toml, service::FrontOptions& service) {
   toml.read("bus", service.bus);
-  if (service.bus != "none" && service.bus != "system" && service.bus != "session")
-    toml.add_error("bus", "expected \"none\", \"system\" or \"session\"");
   toml.read("metrics_port", service.metrics_port);
-  check_range(toml, "metrics_port", service.metrics_port, 0, 65535);
   read_path(toml, "metrics_file", service.metrics_file, false);
+  if (!service.metrics_file.empty())
+    service.metrics_file = std::filesystem::absolute(service.metrics_file);
+  if (const Status status = service.check(); !status) toml.add_error("bus", status.error().what);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "base/result.h"
 #include "base/toml_reader.h"
 #include "render/renderer.h"
+#include "service/front.h"
 #include "tracking/pose_track.h"
 #include "tracking/presence.h"
 #include "tracking/validator.h"
@@ -23,13 +24,6 @@ enum class ClockKind {
 enum class Latch {
   kLate,   ///< as late as the measured draw time allows
   kEarly,  ///< as soon as the frame before is out
-};
-
-/// How the service speaks to the world; keys of the table [service].
-struct ServiceOptions {
-  std::string bus = "none";            ///< or "system" or "session"
-  int metrics_port = 0;                ///< of Prometheus, on the loopback; 0: none
-  std::filesystem::path metrics_file;  ///< likewise as a text file; none where empty
 };
 
 /// veneer.toml. Relative paths refer to the folder of the file. The tables [tracker], [output]
@@ -54,7 +48,7 @@ struct Config {
   Latch latch = Latch::kLate;
   bool has_control = false;    ///< there is a table [control]
   double control_poll_s = 30;  ///< how often the projector is asked how it is. 1 to 3600
-  ServiceOptions service;
+  service::FrontOptions service;
   render::RendererOptions render;
   tracking::PredictionOptions prediction;
   tracking::PresenceOptions presence;

@@ -50,7 +50,9 @@ class TheDaemon final : public Daemon {
   [[nodiscard]] Status blank(bool on) override;
   [[nodiscard]] Status reload() override;
   [[nodiscard]] Result<std::filesystem::path> snapshot() override;
-  [[nodiscard]] const ServiceOptions& service_options() const override { return config_.service; }
+  [[nodiscard]] const service::FrontOptions& service_options() const override {
+    return config_.service;
+  }
 
  private:
   /// What is made when a run begins.

@@ -32,7 +32,7 @@ class Daemon : public service::ServiceControl {
   /// Errors: those of every part where it fails before the first frame.
   [[nodiscard]] virtual Result<Summary> run(const std::atomic<bool>& stop, Progress& progress) = 0;
   /// What the configuration says of who is to speak with it.
-  [[nodiscard]] virtual const ServiceOptions& service_options() const = 0;
+  [[nodiscard]] virtual const service::FrontOptions& service_options() const = 0;
 };
 
 }  // namespace veneer::daemon

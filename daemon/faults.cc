@@ -28,7 +28,7 @@ bool Faults::begin(FaultKind kind, Time now, std::string_view text) {
   present_ |= bit_of(kind);
   if (is_new) fault = Fault{kind, now, {}};
   fault->text = text;
-  note(true, fmt::format("{}: {}", name_of(kind), text));
+  note({fault, true, before, fault->text});
   note_state(before);
   return is_new;
 }
@@ -39,10 +39,10 @@ bool Faults::end(FaultKind kind, Time now) {
   std::optional<Fault>& fault = faults_[index_of(kind)];
   if (!fault) return false;
   const State before = state_locked();
-  note(false,
-       fmt::format("{}: all is well again after {:.1f} s",
-                   name_of(kind),
-                   std::max(0.0, to_seconds(now - fault->since))));
+  note({fault,
+        false,
+        before,
+        fmt::format("after {:.1f} s", std::max(0.0, to_seconds(now - fault->since)))});
   fault.reset();
   present_ &= ~bit_of(kind);
   ++recovered_;
@@ -80,15 +80,13 @@ State Faults::state_locked() const {
   return shown_ || worst >= State::kBlank ? worst : State::kStarting;
 }
 
-void Faults::note(bool worse, std::string text) {
-  if (changes_.size() < kRememberedChanges) changes_.push_back({worse, std::move(text)});
+void Faults::note(Change change) {
+  if (changes_.size() < kRememberedChanges) changes_.push_back(std::move(change));
 }
 
 void Faults::note_state(State before) {
   const State after = state_locked();
-  if (after != before)
-    note(after > before && after > State::kRunning && after != State::kStopping,
-         fmt::format("{} after {}", name_of(after), name_of(before)));
+  if (after != before) note({std::nullopt, false, after, fmt::format("after {}", name_of(before))});
 }
 
 State Faults::state() const {

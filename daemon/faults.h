@@ -39,9 +39,11 @@ class Faults {
   /// Faults that were overcome.
   [[nodiscard]] std::uint64_t recovered() const;
 
-  /// A line of the log, once for each change.
+  /// A line of the log, once for each change: of a fault, or else of the state.
   struct Change {
-    bool worse = false;
+    std::optional<service::Fault> fault;
+    bool begun = false;  ///< the fault; else it is over
+    service::State state = service::State::kStarting;
     std::string text;
   };
   /// The changes since the last call, oldest first; at most kRememberedChanges.
@@ -50,7 +52,7 @@ class Faults {
 
  private:
   [[nodiscard]] service::State state_locked() const;
-  void note(bool worse, std::string text);
+  void note(Change change);
   void note_state(service::State before);
 
   mutable std::mutex mutex_;

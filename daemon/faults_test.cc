@@ -92,14 +92,16 @@ TEST(Faults, EachChangeIsToldOnce) {
   for (int i = 0; i < 5; ++i) faults.begin(FaultKind::kOutput, Time{1s}, "unplugged");
   const auto worse = faults.take_changes();
   ASSERT_EQ(worse.size(), 2U) << "the fault, and the state";
-  EXPECT_TRUE(worse[0].worse);
+  EXPECT_TRUE(worse[0].fault && worse[0].begun);
   EXPECT_NE(worse[0].text.find("unplugged"), std::string::npos);
-  EXPECT_NE(worse[1].text.find("fault after running"), std::string::npos) << worse[1].text;
+  EXPECT_FALSE(worse[1].fault);
+  EXPECT_EQ(worse[1].state, State::kFault);
+  EXPECT_EQ(worse[1].text, "after running");
   EXPECT_TRUE(faults.take_changes().empty());
   faults.end(FaultKind::kOutput, Time{3500ms});
   const auto better = faults.take_changes();
   ASSERT_EQ(better.size(), 2U);
-  EXPECT_FALSE(better[0].worse);
+  EXPECT_TRUE(better[0].fault && !better[0].begun);
   EXPECT_NE(better[0].text.find("2.5 s"), std::string::npos) << better[0].text;
 }
 

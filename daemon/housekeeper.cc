@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/files.h"
+#include "service/journal/journal.h"
 
 namespace veneer::daemon {
 
@@ -49,8 +50,13 @@ void Housekeeper::look() {
 }
 
 void Housekeeper::tell() {
-  for (const Faults::Change& change : faults_.take_changes())
-    spdlog::log(change.worse ? spdlog::level::warn : spdlog::level::info, "{}", change.text);
+  for (const Faults::Change& change : faults_.take_changes()) {
+    if (change.fault) {
+      service::log_fault({change.fault->kind, change.fault->since, change.text}, change.begun);
+    } else {
+      service::log_state(change.state, change.text);
+    }
+  }
 }
 
 void Housekeeper::watch_lateness(Time now) {

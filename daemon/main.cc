@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // veneerd: drives the projector until it is told to stop.
 #include <CLI/CLI.hpp>
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <atomic>
-#include <chrono>
 #include <csignal>
-#include <thread>
 
 #include "base/exit_code.h"
 #include "daemon/daemon.h"
 #include "daemon/manual_page.h"
+#include "service/front.h"
+#include "service/journal/journal.h"
 
 namespace {
 
@@ -51,8 +50,7 @@ int main(int argc, char** argv) {
     return kExitDone;
   }
 
-  spdlog::set_default_logger(spdlog::stderr_color_mt("veneerd"));
-  spdlog::set_pattern("%n %^%l%$: %v");
+  service::log_as("veneerd");
   if (quiet) spdlog::set_level(spdlog::level::warn);
   struct sigaction action {};
   action.sa_handler = request_stop;
@@ -68,19 +66,9 @@ int main(int argc, char** argv) {
     spdlog::error("{}", daemon.error().what);
     return exit_code_of(daemon.error());
   }
-  service::ServiceControl& control = **daemon;
-  // A signal handler can only set a flag, and a reload may take seconds.
-  std::jthread reloader([&control](const std::stop_token& stop) {
-    constexpr std::chrono::milliseconds kFlagInterval{50};
-    while (!stop.stop_requested()) {
-      std::this_thread::sleep_for(kFlagInterval);
-      if (!reload_requested.exchange(false)) continue;
-      if (const Status status = control.reload(); !status)
-        spdlog::warn("the reload is refused, all stays as it is: {}", status.error().what);
-    }
-  });
-  // Here start what speaks of `control` to the world: the bus, the notifier, the metrics
-  // (Config::service).
+  service::FrontOptions to_the_world = (*daemon)->service_options();
+  to_the_world.reload_requested = &reload_requested;
+  const auto front = service::Front::start(**daemon, to_the_world);
   const Result<daemon::Summary> summary =
       (*daemon)->run(stop_requested, quiet ? static_cast<Progress&>(silent) : *progress);
   if (!summary) {
