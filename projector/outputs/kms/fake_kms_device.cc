@@ -331,7 +331,11 @@ int FakeKmsDevice::commit(std::span<const KmsSetting> settings,
   if (how == KmsCommit::kTest) return 0;
   for (std::size_t i = 0; i < static_cast<std::size_t>(card_.crtcs); ++i) {
     const auto framebuffer = static_cast<KmsId>(wanted.at({primary_id(i), "FB_ID"}));
-    if (framebuffer != 0) promised_[framebuffer] = contents(framebuffer);
+    if (framebuffer == 0) continue;
+    const std::string now = contents(framebuffer);
+    const auto [promised, first] = promised_.emplace(framebuffer, now);
+    if (!first && promised->second != now) ++card_.torn;
+    promised->second = now;
   }
   if (how == KmsCommit::kFlip) {
     const auto retraces = clock_.now().time_since_epoch() / card_.period + 1;
