@@ -230,11 +230,15 @@ uvec3 chosen(Brackets b, vec3 drive, vec3 threshold) {
 // The highest that any threshold chooses.
 uvec3 highest(Brackets b, vec3 drive) { return chosen(b, drive, vec3(0.0)); }
 
+#if defined(COMPENSATE) && !defined(RESIDUAL)
+vec3 residual_of(vec3 t) { return vec3(0.0); }
+#else
 vec3 residual_of(vec3 t) {
   int last_node = constants.last_residual_node;
   if (last_node == 0) return vec3(0.0);
   return between_nodes(residual_texture, sqrt(t) * float(last_node), last_node);
 }
+#endif
 
 bool is_allowed(uvec3 code) {
   vec3 t;
@@ -252,18 +256,25 @@ bool hold(vec3 drive, Brackets wanted, vec3 threshold, inout uvec3 code) {
   vec3 sent = kCorrects ? drive + residual_of(drive) : drive;
   float root = 0.0;
   float way_left = 0.5;
-  // No turn where nothing is over, and of no constant count: software rasterisers skip no branch.
-  for (int i = 0; i < (is_over ? constants.ceiling_steps : 0); ++i) {
-    float tried = root + way_left;
-    vec3 scaled = clamp(corrected(tried * tried * sent), 0.0, 1.0);
-    if (is_allowed(highest(brackets_of(scaled), scaled))) root = tried;
+  // All that is done for what is over is in the loop, and its count is no constant: software
+  // rasterisers skip no branch, but they leave a loop.
+  int steps = constants.ceiling_steps;
+  for (int i = 0; i < (is_over ? steps + 1 : 0); ++i) {
+    bool is_last = i == steps;
+    float tried = is_last ? root : root + way_left;
+    vec3 scaled = tried > 0.0 ? clamp(corrected(tried * tried * sent), 0.0, 1.0) : vec3(0.0);
+    Brackets b = brackets_of(scaled);
+    uvec3 most = highest(b, scaled);
+    uvec3 asked = is_last ? chosen(b, scaled, threshold) : most;
+    bool allowed = is_allowed(asked);
+    if (is_last) {
+      code = allowed ? asked : most;
+    } else if (allowed) {
+      root = tried;
+    }
     way_left *= 0.5;
   }
   if (!is_over) return false;
-  vec3 under = root > 0.0 ? clamp(corrected(root * root * sent), 0.0, 1.0) : vec3(0.0);
-  Brackets b = brackets_of(under);
-  code = chosen(b, under, threshold);
-  if (!is_allowed(code)) code = highest(b, under);
   return before != uvec3(0u);
 }
 #endif
