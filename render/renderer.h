@@ -44,7 +44,8 @@ struct RendererOptions {
   double luminance_ceiling = 0;
 };
 
-/// What one frame needs to know.
+/// What one frame needs to know. Where any of it is no number that single precision holds, or
+/// specular_weight is not in [0, 1], the frame is dark.
 struct FrameInput {
   Eigen::Vector3d eye_in_world;
   RigidTransform world_from_object;
@@ -75,7 +76,7 @@ class Renderer {
   /// @param scanout  the display's buffers, if draw_to_scanout() will be called; borrowed, must
   /// outlive the renderer.
   /// Errors: kUnavailable (no EGL, no GL 4.5, buffers that cannot be imported; says what there is),
-  /// kBadFormat, kInvalidOption.
+  /// kBadFormat, kInvalidOption (also buffers of another size or of fewer bits than the profile).
   [[nodiscard]] static Result<std::unique_ptr<Renderer>> create(
       const Scene& scene,
       const btf::Material& material,
@@ -92,13 +93,14 @@ class Renderer {
 
   /// From the next frame on, draws for another profile. Only uploads; all that takes long was done
   /// when the profile was prepared, with this renderer's options.
-  /// Errors: kInvalidOption (another raster or other bits: a restart is needed); the old one stays.
+  /// Errors: kInvalidOption (another raster, other bits or another luminance ceiling: a restart is
+  /// needed); the old one stays.
   [[nodiscard]] virtual Status set_profile(const PreparedProfile& profile) = 0;
   /// Issues the GL commands of one frame. No allocation, no read-back, no wait.
   virtual void draw(const FrameInput& input) = 0;
   /// Issues the commands that bring the last frame's codes into a buffer of the display: as they
   /// are, in the low bits of 8-bit channels, or widened to 10 where the format has more than the
-  /// profile.
+  /// profile. Software drivers leave no fence in it: finish() comes before it is shown.
   virtual void draw_to_scanout(std::size_t buffer) = 0;
   /// Waits for the last frame and reads it: codes of ProjectorProfile::bits bits, first row on top.
   virtual void read_codes(ImageView<Rgb16> codes) = 0;

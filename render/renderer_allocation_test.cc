@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <new>
 
 #include "render/egl_context.h"
 #include "render/internal_testing.h"
 #include "render/renderer.h"
+#include "render/scanout_pass.h"
 
 namespace {
 
@@ -34,27 +36,48 @@ TEST(RendererAllocation, CountingWorks) {
   EXPECT_EQ(allocations, before + 1);
 }
 
-TEST(RendererAllocation, DrawDoesNotAllocateOnceWarm) {
+TEST(RendererAllocation, AFrameDoesNotAllocateOnceWarm) {
   if (const auto context = EglContext::create(); !context) GTEST_SKIP() << context.error().what;
   Scene scene;
   scene.mesh = *load_mesh("sphere");
   scene.lights = {DirectionalLight{}, PointLight{}};
   const auto profile = example_profile(64, 48, 8);
-  const auto renderer =
-      Renderer::create(scene, ShaderMaterial("return vec3(view.z * light.z);"), profile, {});
+  const auto renderer = Renderer::create(
+      scene, ShaderMaterial("return vec3(view.z * light.z);"), profile, {.luminance_ceiling = 1.0});
   ASSERT_TRUE(renderer) << renderer.error().what;
   FrameInput input{{0, 0, 1}, {}, 0};
   const auto draw = [&](int frames) {
     for (int i = 0; i < frames; ++i) {
       input.dither_seed = static_cast<std::uint32_t>(i);
-      input.eye_in_world.x() = 0.01 * i;
+      input.eye_in_world.x() = i % 10 == 9 ? NAN : 0.01 * i;  // a dark frame now and then
       (*renderer)->draw(input);
       static_cast<void>((*renderer)->statistics());
+      static_cast<void>((*renderer)->lost());
     }
   };
   draw(20);  // the driver compiles its shaders at first use
   const std::size_t before = allocations;
   draw(100);
+  EXPECT_EQ(allocations, before);
+}
+
+// What draw_to_scanout() does, into a texture in place of a display's buffer.
+TEST(RendererAllocation, ScanningOutDoesNotAllocateOnceWarm) {
+  const auto context = EglContext::create();
+  if (!context) GTEST_SKIP() << context.error().what;
+  constexpr int kSide = 32;
+  const auto pass = ScanoutPass::create(8);
+  ASSERT_TRUE(pass) << pass.error().what;
+  const GlTexture codes = make_texture_2d(GL_RGBA16UI, kSide, kSide);
+  const GlTexture target = make_texture_2d(GL_RGBA8, kSide, kSide);
+  const GlFramebuffer framebuffer = make_framebuffer();
+  glNamedFramebufferTexture(framebuffer.id(), GL_COLOR_ATTACHMENT0, target.id(), 0);
+  const auto run = [&](int frames) {
+    for (int i = 0; i < frames; ++i) pass->run(codes.id(), framebuffer.id(), 8, kSide, kSide);
+  };
+  run(5);
+  const std::size_t before = allocations;
+  run(50);
   EXPECT_EQ(allocations, before);
 }
 
