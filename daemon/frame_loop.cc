@@ -139,9 +139,8 @@ void FrameLoop::notice_tracker() {
 // --- between two frames
 
 void FrameLoop::between_frames() {
-  if (show_->profiles && show_->renderer) show_->profiles->apply(*show_->renderer);
-  if (!parts_.loader.take_next(show_)) return;
-  renderer_lost_ = false;
+  if (show_->profiles && show_->renderer && !show_->lost) show_->profiles->apply(*show_->renderer);
+  parts_.loader.take_next(show_);
 }
 
 // Whether there is an output, and a show that suits it.
@@ -207,7 +206,7 @@ FrameLoop::Made FrameLoop::make_frame(const Slot& slot, FrameRecord& record) {
     parts_.wishes.is_dark = true;
     return Made::kDropped;
   }
-  if (parts_.wishes.dark || !show_->renderer || renderer_lost_) return make_dark();
+  if (parts_.wishes.dark || !show_->renderer || show_->lost) return make_dark();
   projector::Output& output = *parts_.output.get();
   render::Renderer& renderer = *show_->renderer;
   projector::Frame frame;
@@ -283,7 +282,7 @@ FrameLoop::Made FrameLoop::make_dark() {
 }
 
 FrameLoop::Made FrameLoop::lose_renderer() {
-  renderer_lost_ = true;
+  show_->lost = true;
   const Made made = make_dark();
   parts_.faults.begin(FaultKind::kGpu,
                       parts_.clock.now(),

@@ -126,8 +126,7 @@ class FrameLoop {
   Duration period_;
   Time start_;  // of the next frame, where it has none
   bool first_made_ = false;
-  bool renderer_lost_ = false;  // the show's, until the next show
-  bool dark_ = false;           // and the output knows
+  bool dark_ = false;  // and the output knows
   bool dark_failed_ = false;
   Time dark_told_;
   bool tracker_bad_ = false;

@@ -5,68 +5,21 @@
 
 #include <numbers>
 #include <optional>
+#include <thread>
+
+#include "daemon/testing/fakes.h"
+#include "render/internal_testing.h"
 
 namespace veneer::daemon {
 namespace {
 
 using namespace std::chrono_literals;
+using testing::FakeOutput;
+using testing::FakeRenderer;
+using testing::MovingTracker;
+using testing::Stagehand;
 
-/// A body that moves along x at 1 m/s and is measured every 4 ms; gone after `end`.
-class MovingTracker final : public tracking::Tracker {
- public:
-  MovingTracker(Clock& clock, Time first, Time end) : clock_(clock), next_(first), end_(end) {}
-  std::string description() const override { return "a moving body"; }
-  Result<tracking::PoseSample> wait_pose(Duration timeout) override {
-    if (next_ > end_) return fail(Errc::kDisconnected, "unplugged");
-    const Time deadline = clock_.now() + timeout;
-    clock_.sleep_until(std::min(next_, deadline));
-    if (next_ > deadline) return fail(Errc::kTimeout, "nothing yet");
-    tracking::PoseSample sample;
-    sample.time = next_;
-    sample.sequence = ++sequence_;
-    sample.world_from_body.translation.x() = to_seconds(next_.time_since_epoch());
-    next_ += 4ms;
-    return sample;
-  }
-
- private:
-  Clock& clock_;
-  Time next_;
-  Time end_;
-  std::uint64_t sequence_ = 0;
-};
-
-/// Remembers what it was asked to draw.
-class RecordingRenderer final : public render::Renderer {
- public:
-  void release() override {}
-  bool lost() override { return false; }
-  void draw_to_scanout(std::size_t /*buffer*/) override {}
-  Status set_profile(const render::PreparedProfile&) override { return {}; }
-  void draw(const render::FrameInput& input) override { inputs.push_back(input); }
-  void read_codes(ImageView<Rgb16> codes) override { codes(0, 0) = {7, 8, 9}; }
-  void read_target(ImageView<Rgb32f>) override {}
-  void finish() override {}
-  render::FrameStatistics statistics() override { return {}; }
-  std::string description() const override { return "recording"; }
-  std::vector<render::FrameInput> inputs;
-};
-
-class CountingOutput final : public projector::Output {
- public:
-  std::string description() const override { return "counting"; }
-  bool wants_pixels(std::uint64_t) const override { return true; }
-  Status present(const projector::Frame& frame) override {
-    if (fail_at && frame.number == *fail_at) return fail(Errc::kIo, "the disk is full");
-    EXPECT_EQ(frame.codes(0, 0), (Rgb16{7, 8, 9}));
-    times.push_back(frame.display_time);
-    return {};
-  }
-  std::optional<std::uint64_t> fail_at;
-  std::vector<Time> times;
-};
-
-class FrameLoopTest : public testing::Test {
+class FrameLoopTest : public ::testing::Test {
  protected:
   FrameLoopTest() {
     config_.clock = ClockKind::kVirtual;
@@ -75,18 +28,53 @@ class FrameLoopTest : public testing::Test {
     config_.display_latency_ms = 10;
   }
   Result<RunRecord> run(Time first_sample = Time{1ms}, Time tracker_end = Time{1h}) {
-    MovingTracker tracker(clock_, first_sample, tracker_end);
-    PoseFeed poses(tracker, clock_, config_.clock, {0}, config_.prediction, config_.validation);
-    FrameLoop loop(config_, scene_, {4, 3, 8}, clock_, poses, renderer_, output_);
+    return run(clock_,
+               std::make_unique<MovingTracker>(clock_, first_sample, tracker_end),
+               std::make_unique<FakeOutput>(hand_));
+  }
+  Result<RunRecord> run(Clock& clock,
+                        std::unique_ptr<tracking::Tracker> tracker,
+                        std::unique_ptr<projector::Output> output) {
+    PoseFeed poses(
+        std::move(tracker), {}, clock, config_.clock, {0}, config_.prediction, config_.validation);
+    Faults faults;
+    FigureBoard board;
+    Wishes wishes;
+    auto* const counting = dynamic_cast<FakeOutput*>(output.get());
+    OutputKeeper keeper(
+        std::move(output), [this] { return std::make_unique<FakeOutput>(hand_); }, clock, faults);
+    Devices devices;
+    FakeRenderer* renderer = nullptr;
+    devices.make_renderer = [&](auto&&...) {
+      auto made = std::make_unique<FakeRenderer>(hand_);
+      renderer = made.get();
+      return made;
+    };
+    ShowLoader loader(devices, config_.clock, poses, clock, faults);
+    Script script;
+    script.config = config_;
+    script.scene = scene_;
+    script.material = std::make_shared<render::ShaderMaterial>("");
+    script.profile.geometry.width = 4;
+    script.profile.geometry.height = 3;
+    script.profile.bits = 8;
+    std::unique_ptr<Show> show = loader.begin(script).value();
+    FrameLoop loop({config_, clock, poses, keeper, loader, faults, board, wishes, {}},
+                   std::move(show));
     SilentProgress silent;
-    return loop.run(stop_, silent);
+    Result<RunRecord> record = loop.run(stop_, silent);
+    inputs_ = renderer->inputs;
+    if (counting != nullptr && keeper.get() == counting) times_ = counting->times;
+    loader.stop(loop.take_show());
+    return record;
   }
 
   Config config_;
   render::Scene scene_;
   VirtualClock clock_;
-  RecordingRenderer renderer_;
-  CountingOutput output_;
+  Stagehand hand_;
+  std::vector<render::FrameInput> inputs_;
+  std::vector<Time> times_;
   std::atomic<bool> stop_{false};
 };
 
@@ -94,9 +82,9 @@ TEST_F(FrameLoopTest, ShowsOneFrameAPeriodAndNoneTwice) {
   const RunRecord record = run().value();
   EXPECT_EQ(record.count, 20U);
   EXPECT_EQ(record.dropped, 0U);
-  ASSERT_EQ(output_.times.size(), 20U);
-  for (std::size_t i = 1; i < output_.times.size(); ++i) {
-    EXPECT_EQ(output_.times[i] - output_.times[i - 1], Duration(20ms));
+  ASSERT_EQ(times_.size(), 20U);
+  for (std::size_t i = 1; i < times_.size(); ++i) {
+    EXPECT_EQ(times_[i] - times_[i - 1], Duration(20ms));
   }
 }
 
@@ -105,11 +93,9 @@ TEST_F(FrameLoopTest, DrawsForTheEyeAtTheMomentOfDisplay) {
   ASSERT_TRUE(run());
   // From the third frame on there are velocities; the motion is exactly what prediction assumes.
   constexpr double kRounding = 1e-9;
-  for (std::size_t i = 3; i < renderer_.inputs.size(); ++i) {
-    EXPECT_NEAR(renderer_.inputs[i].eye_in_world.x(),
-                to_seconds(output_.times[i].time_since_epoch()),
-                kRounding);
-    EXPECT_NEAR(renderer_.inputs[i].eye_in_world.y(), 0.03, kRounding);
+  for (std::size_t i = 3; i < inputs_.size(); ++i) {
+    EXPECT_NEAR(inputs_[i].eye_in_world.x(), to_seconds(times_[i].time_since_epoch()), kRounding);
+    EXPECT_NEAR(inputs_[i].eye_in_world.y(), 0.03, kRounding);
   }
 }
 
@@ -140,15 +126,35 @@ TEST_F(FrameLoopTest, GoesOnWithTheLastPoseWhenTheTrackerGoes) {
   EXPECT_EQ(record.count, 20U);
   EXPECT_EQ(record.frames.back().presence, tracking::Presence::kStale);
   EXPECT_GT(record.held, 0U);
-  EXPECT_TRUE(renderer_.inputs.back().eye_in_world.allFinite());
+  EXPECT_TRUE(inputs_.back().eye_in_world.allFinite());
 }
 
-TEST_F(FrameLoopTest, EndsWithTheOutputsError) {
-  output_.fail_at = 3;
+TEST_F(FrameLoopTest, ARunOfSoManyFramesEndsWithTheOutputsError) {
+  hand_.output_broken = true;
   const auto record = run();
   ASSERT_FALSE(record);
   EXPECT_EQ(record.error().code, Errc::kIo);
-  EXPECT_EQ(output_.times.size(), 3U);
+  EXPECT_EQ(hand_.presented, 0U);
+}
+
+TEST_F(FrameLoopTest, EndsWhenSomebodyClosesTheOutput) {
+  hand_.output_closed = true;
+  const RunRecord record = run().value();
+  EXPECT_EQ(record.count, 0U);
+}
+
+TEST_F(FrameLoopTest, SaysWhereTheTimeFromPoseToLightWent) {
+  const RunRecord record = run().value();
+  for (const FrameRecord& frame : record.frames) {
+    // In virtual time nothing takes any but the display; the GPU says what it says.
+    EXPECT_EQ(frame.latency_ms.tracker, 0);
+    EXPECT_EQ(frame.latency_ms.hand_off, 0);
+    EXPECT_GE(frame.latency_ms.wait, 0);
+    EXPECT_LT(frame.latency_ms.wait, 4) << "the tracker's interval";
+    EXPECT_EQ(frame.latency_ms.gpu_draw, 0.3);
+    EXPECT_NEAR(frame.latency_ms.compensate, 0.2, 1e-12);
+    EXPECT_NEAR(frame.latency_ms.display, 10, 1e-9);
+  }
 }
 
 TEST_F(FrameLoopTest, StopsWhenAsked) {
@@ -172,12 +178,11 @@ TEST_F(FrameLoopTest, CountsTheFramesItLosesInRealTime) {
   config_.frame_rate_hz = 100;
   config_.frames = 5;
   SteadyClock clock;
-  MovingTracker tracker(clock, clock.now(), clock.now() + 1h);
-  PoseFeed poses(tracker, clock, config_.clock, {0}, config_.prediction, config_.validation);
-  SlowOutput output;
-  FrameLoop loop(config_, scene_, {4, 3, 8}, clock, poses, renderer_, output);
-  SilentProgress silent;
-  const RunRecord record = loop.run(stop_, silent).value();
+  const RunRecord record =
+      run(clock,
+          std::make_unique<MovingTracker>(clock, clock.now(), clock.now() + 1h),
+          std::make_unique<SlowOutput>())
+          .value();
   EXPECT_GE(record.dropped, 4U);
   EXPECT_GE(record.late, 1U);
 }

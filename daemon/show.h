@@ -71,6 +71,7 @@ struct Show {
   const Scanout* refused = nullptr;  ///< those that the renderer could not draw into
   std::unique_ptr<std::atomic<int>, ScanoutUse> scanout_use;  // before the renderer: it goes later
   std::unique_ptr<render::Renderer> renderer;                 ///< null once its display has gone
+  bool lost = false;                                          ///< its GPU was reset
   std::string description;                                    ///< the renderer's
   Observers observers;
   tracking::PresenceFilter object;
