@@ -17,7 +17,9 @@ Result<int> run_harness(CommandLine& line);
 Result<int> run_import(CommandLine& line);
 Result<int> run_projector(CommandLine& line);
 Result<int> run_render(CommandLine& line);
+Result<int> run_status(CommandLine& line);
 Result<int> run_synthesize(CommandLine& line);
+Result<int> run_tell(CommandLine& line);
 Result<int> run_track(CommandLine& line);
 Result<int> run_verify(CommandLine& line);
 

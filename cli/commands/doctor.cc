@@ -8,9 +8,11 @@
 #include "capture/cameras/cameras.h"
 #include "cli/commands/commands.h"
 #include "cli/ranks/ranks.h"
+#include "cli/service/status_text.h"
 #include "projector/control/dlpc350/dlpc350.h"
 #include "projector/outputs/window/displays.h"
 #include "render/egl_context.h"
+#include "service/bus/bus_client.h"
 #include "tracking/usb_access.h"
 
 namespace veneer::cli {
@@ -137,6 +139,19 @@ nlohmann::ordered_json look_at_displays(std::string& text) {
   return json;
 }
 
+/// How the service is, or why it cannot be asked. It need not run: the tools do without.
+nlohmann::ordered_json look_at_service(std::string& text) {
+  Result<service::BusClient> client = service::BusClient::connect({});
+  const Result<service::ServiceStatus> status =
+      client ? client->status() : tl::unexpected(client.error());
+  if (!status) {
+    text = "\nservice  " + status.error().what;
+    return {{"running", false}, {"problem", status.error().what}};
+  }
+  text = fmt::format("\nservice  {}", line_of(*status, SteadyClock().now()));
+  return {{"running", true}, {"state", name_of(status->state)}};
+}
+
 }  // namespace
 
 Result<int> run_doctor(CommandLine& line) {
@@ -152,6 +167,8 @@ Result<int> run_doctor(CommandLine& line) {
   const nlohmann::ordered_json light_engines = look_at_light_engines(light_engines_text);
   std::string displays_text;
   const nlohmann::ordered_json displays = look_at_displays(displays_text);
+  std::string service_text;
+  const nlohmann::ordered_json service = look_at_service(service_text);
   line.print({{"gl", gl},
               {"gl_usable", egl.has_value()},
               {"blas", blas},
@@ -162,8 +179,9 @@ Result<int> run_doctor(CommandLine& line) {
               {"cameras", cameras.json},
               {"cameras_failed", cameras.failed},
               {"light_engines", light_engines},
-              {"displays", displays}},
-             fmt::format("OpenGL   {}{}\nBLAS     {}\nMPI      {}\nthreads  {}{}{}{}{}{}",
+              {"displays", displays},
+              {"service", service}},
+             fmt::format("OpenGL   {}{}\nBLAS     {}\nMPI      {}\nthreads  {}{}{}{}{}{}{}",
                          egl ? "" : "not usable: ",
                          gl,
                          blas,
@@ -173,7 +191,8 @@ Result<int> run_doctor(CommandLine& line) {
                          instruments.text,
                          cameras.text,
                          light_engines_text,
-                         displays_text));
+                         displays_text,
+                         service_text));
   return egl && trackers.all_usable ? kExitDone : kExitFailed;
 }
 
