@@ -87,7 +87,7 @@ TEST_F(ServiceTest, StatusSaysWhereToLookWhenThereIsNoService) {
 TEST_F(ServiceTest, TellHasEverythingDone) {
   for (const char* each : {"blank", "unblank", "reload", "scene /s.toml"})
     EXPECT_EQ(run(fmt::format("veneer tell {} {}", option(), each)).exit_code, 0) << each;
-  EXPECT_EQ(run("veneer tell light 2 0,-1,2.5 750 " + option()).exit_code, 0);
+  EXPECT_EQ(run("veneer tell light 2 -0.5,-1,2.5 750 " + option()).exit_code, 0);
   EXPECT_EQ(run("veneer tell light 0 1,0,0 5 --colour 1,0.5,0 " + option()).exit_code, 0);
   const Outcome snapshot = run("veneer tell snapshot " + option());
   EXPECT_EQ(snapshot.out, "/var/lib/veneer/snapshot.png\n");
@@ -98,7 +98,7 @@ TEST_F(ServiceTest, TellHasEverythingDone) {
                   "unblank",
                   "reload",
                   "scene /s.toml",
-                  "light 2 0 -1 2.5 750 1 1 1",
+                  "light 2 -0.5 -1 2.5 750 1 1 1",
                   "light 0 1 0 0 5 1 0.5 0",
                   "snapshot",
                   "material " + (std::filesystem::current_path() / "b.safetensors").string()));
@@ -108,7 +108,12 @@ TEST_F(ServiceTest, TellSaysWhyItIsRefused) {
   control_.refuse_with(Error{Errc::kNotFound, "loading /x: no such file"});
   EXPECT_TRUE(fails(run("veneer tell material /x " + option()), 1, "loading /x: no such file"));
   EXPECT_TRUE(fails(run("veneer tell light 0 0,0,0 5 " + option()), 2, "direction"));
-  EXPECT_TRUE(fails(run("veneer tell light 0 0,0 5 " + option()), 2, ""));
+  for (const char* each : {"0,0", "0,0,1,", "0,0,1,1", ",0,1", "a,b,c", "0;0;1", "''"})
+    EXPECT_TRUE(fails(run(fmt::format("veneer tell light 0 \"{}\" 5 {}", each, option())),
+                      2,
+                      "is not three numbers"))
+        << each;
+  EXPECT_TRUE(fails(run("veneer tell light 0 0,0,1 nan " + option()), 2, "lux"));
   EXPECT_TRUE(fails(run("veneer tell light -- -1 0,0,1 5 " + option()), 2, ""));
   EXPECT_TRUE(fails(run("veneer tell dance " + option()), 2, ""));
   EXPECT_TRUE(fails(run("veneer tell"), 2, ""));
