@@ -24,14 +24,14 @@ v4l2() {
 
 usb() {
   MODULES=$'dummy_hcd num=2\nlibcomposite\nusb_f_hid\nusb_f_fs\nusb_f_ss_lb\nusbhid\nhid_generic' \
-    LAB_SECONDS=300 "$kernel" "$work" "$source/tests/lab/usb.sh" "$bin" "$source"
+    LAB_SECONDS=400 "$kernel" "$work" "$source/tests/lab/usb.sh" "$bin" "$source"
 }
 
 kms() {
   local status=0 picture
   need_show
   rm -rf "$work/kms" "$work/kms-daemon"
-  LAB_SCREEN=1024x768 LAB_OUT=$work/kms LAB_SECONDS=200 \
+  LAB_SCREEN=1024x768 LAB_OUT=$work/kms LAB_SECONDS=400 \
     "$kernel" "$work" "$source/tests/lab/kms.sh" "$bin" "$source" 1024 768 || status=1
   for picture in "$work"/kms/*.codes; do
     picture=${picture%.codes}
@@ -42,7 +42,7 @@ kms() {
       status=1
     fi
   done
-  LAB_SCREEN=96x72 LAB_OUT=$work/kms-daemon LAB_SECONDS=300 \
+  LAB_SCREEN=96x72 LAB_OUT=$work/kms-daemon LAB_SECONDS=400 \
     "$kernel" "$work" "$source/tests/lab/kms_daemon.sh" "$bin" "$source" "$show" || status=1
   return "$status"
 }
@@ -52,7 +52,7 @@ service() {
   need_show
   packages=("$source"/out/veneer_*.deb)
   [[ -f ${packages[-1]} ]] || { echo "no package in out/; make it: ./dev package" >&2; return 1; }
-  LAB_INIT=systemd LAB_SECONDS=600 \
+  LAB_INIT=systemd LAB_SECONDS=700 \
     "$kernel" "$work" "$source/tests/lab/service.sh" "${packages[-1]}" "$source" "$show"
 }
 
