@@ -38,7 +38,7 @@ journal() { journalctl --no-pager -o json -u veneerd "$@"; }
 
 expect "the package installs" dpkg --install --force-depends --force-unsafe-io --no-triggers "$package"
 expect "the user veneer may use displays and devices" says 'video.*plugdev|plugdev.*video' id -Gn veneer
-expect "systemd finds nothing wrong with the unit" fails says 'veneerd.service' systemd-analyze verify veneerd.service
+expect "systemd finds nothing wrong with the unit" fails says 'veneerd.service' systemd-analyze verify --man=no veneerd.service
 cp -r "$show"/. /etc/veneer/
 chmod -R a+rX /etc/veneer
 cat >>"$config" <<'TOML'
@@ -58,7 +58,7 @@ useradd --no-create-home --groups veneer curator
 
 # --- started
 
-expect "it starts, and says when it is ready" timeout "$patience" systemctl start veneerd
+expect "it starts, and says when it is ready" timeout 175 systemctl start veneerd
 expect "it is active" says '^active$' unit ActiveState
 expect "it tells systemd what it is doing" says '.' unit StatusText
 expect "it runs as the user veneer" says '^veneer' ps -o user= -p "$(unit MainPID)"
