@@ -2,18 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 # For scripts in the emulated machine: what is expected, one line each, and whether all of it came true.
 
-expected=0
-unmet=0
+expect_total=0
+expect_unmet=0
 
 # expect TEXT COMMAND...: COMMAND succeeds. What it printed is shown where it does not.
 expect() {
   local text=$1 printed
   shift
-  expected=$((expected + 1))
+  expect_total=$((expect_total + 1))
   if printed=$("$@" 2>&1); then
     printf 'ok      %s\n' "$text"
   else
-    unmet=$((unmet + 1))
+    expect_unmet=$((expect_unmet + 1))
     printf 'FAILED  %s: %s\n' "$text" "$*"
     printf '%s\n' "$printed" | sed 's/^/        /'
   fi
@@ -56,6 +56,6 @@ says() {
 
 # The last line of a script: as many as expected, and whether all were met.
 expect_end() {
-  printf '%d of %d expectations were met\n' $((expected - unmet)) "$expected"
-  ((unmet == 0 && expected > 0))
+  printf '%d of %d expectations were met\n' $((expect_total - expect_unmet)) "$expect_total"
+  ((expect_unmet == 0 && expect_total > 0))
 }

@@ -25,7 +25,7 @@ shows_the_frame() {
 log=/run/lab/veneerd.log
 "${veneerd[@]}" --set 'output.driver="kms"' >"$log" 2>&1 &
 daemon=$!
-expect_within 100 "the screen shows what is drawn" shows_the_frame
+expect_within 240 "the screen shows what is drawn" shows_the_frame
 kill -TERM "$daemon"
 status=0
 wait "$daemon" || status=$?
