@@ -18,11 +18,17 @@ need_show() {
   fi
 }
 
+# The machine's users are made in a copy of this one's list, which only root may read.
+need_users() {
+  [[ -r /etc/shadow ]] || { echo "lab: /etc/shadow cannot be read; run this part as root" >&2; return 1; }
+}
+
 v4l2() {
   MODULES="vivid node_types=0x101" LAB_SECONDS=150 "$kernel" "$work" "$bin/veneer_v4l2_lab_test"
 }
 
 usb() {
+  need_users
   MODULES=$'dummy_hcd num=2\nlibcomposite\nusb_f_hid\nusb_f_fs\nusb_f_ss_lb\nusbhid\nhid_generic' \
     LAB_SECONDS=400 "$kernel" "$work" "$source/tests/lab/usb.sh" "$bin" "$source"
 }
@@ -49,6 +55,7 @@ kms() {
 
 service() {
   local packages
+  need_users
   need_show
   packages=("$source"/out/veneer_*.deb)
   [[ -f ${packages[-1]} ]] || { echo "no package in out/; make it: ./dev package" >&2; return 1; }
