@@ -69,11 +69,15 @@ using ControlRecord = std::map<std::string, std::string>;
 /// One thread at a time. Every call is bounded in time. Errors of all: kNotFound (it cannot be
 /// reached), kTimeout (try again), kDisconnected (open again, unless the driver says that it does
 /// so itself), kBadFormat (what it says makes no sense), kInvalidOption (a wrong password or
-/// value), kUnavailable (this projector cannot, or not now; the text says which), kIo.
+/// value), kUnavailable (this projector cannot, or not now; the text says which), kIo, kCancelled
+/// (interrupt() was called).
 class ProjectorControl {
  public:
   virtual ~ProjectorControl() = default;
   [[nodiscard]] virtual std::string description() const = 0;
+  /// Ends the call that is under way, and every later one, soon and with kCancelled. Any thread.
+  /// By default does nothing: for drivers whose calls are short.
+  virtual void interrupt() {}
   /// Asks for everything. A device that minds being asked often answers from what it said last.
   [[nodiscard]] virtual Result<ProjectorState> read_state() = 0;
   /// Returns when the command is accepted; warming up and cooling take a minute or more.

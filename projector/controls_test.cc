@@ -75,5 +75,25 @@ TEST(PjlinkOptions, ThePasswordIsTheFirstLineOfItsFile) {
   }
 }
 
+TEST(PjlinkOptions, APasswordFileThatIsNoneIsRefusedAndNotReadForEver) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.path() / "empty").flush();
+  std::ofstream(folder.path() / "long") << std::string(257, 'x');
+  std::ofstream(folder.path() / "longest") << std::string(256, 'x') << "\nmore";
+  const auto control_with = [&](const std::string& file) {
+    return control_of("driver = \"pjlink\"\nhost = \"a\"\npassword_file = \"" + file + "\"");
+  };
+  for (const std::string& file : {std::string("/dev/zero"),
+                                  folder.path().string(),
+                                  (folder.path() / "empty").string(),
+                                  (folder.path() / "long").string()}) {
+    const auto control = control_with(file);
+    ASSERT_FALSE(control) << file;
+    EXPECT_EQ(control.error().code, Errc::kNotFound);
+    EXPECT_THAT(control.error().what, HasSubstr("first line"));
+  }
+  EXPECT_TRUE(control_with((folder.path() / "longest").string()));
+}
+
 }  // namespace
 }  // namespace veneer::projector

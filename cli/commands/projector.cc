@@ -14,6 +14,7 @@
 
 #include "base/exit_code.h"
 #include "cli/commands/commands.h"
+#include "projector/control_watch.h"
 #include "projector/controls.h"
 
 namespace veneer::cli {
@@ -73,6 +74,7 @@ Result<std::unique_ptr<ProjectorControl>> open_control(const ProjectorOptions& o
                                        : TomlReader::open(options.config, settings));
   TomlReader table = toml.table("control");
   VENEER_ASSIGN(std::unique_ptr<ProjectorControl> control, projector::open_control(table, clock));
+  static_cast<void>(projector::ControlWatchOptions::read(table));  // veneerd's, in the same table
   toml.ignore_the_rest();
   VENEER_TRY(toml.finish());
   return control;

@@ -169,6 +169,8 @@ std::string Dlpc350::description() const {
 Result<std::optional<Bytes>> Dlpc350::exchange(Command command,
                                                const std::vector<Report>& request,
                                                bool is_read) {
+  // Looked at between messages alone; one takes no longer than the time limit.
+  if (interrupted_) return fail(Errc::kCancelled, "speaking with the DLPC350: it was interrupted");
   const Time deadline = clock_.now() + options_.time_limit;
   const auto sequence = std::to_integer<std::uint8_t>(request.front()[1]);
   for (const Report& report : request) VENEER_TRY(device_->write(report));

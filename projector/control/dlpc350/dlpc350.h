@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -44,6 +45,7 @@ class Dlpc350 final : public ProjectorControl {
   ~Dlpc350() override;
 
   [[nodiscard]] std::string description() const override;
+  void interrupt() override { interrupted_ = true; }
   [[nodiscard]] Result<ProjectorState> read_state() override;
   [[nodiscard]] Status power(bool on) override;
   /// Switches its LEDs off: black mirrors still leak light.
@@ -72,6 +74,7 @@ class Dlpc350 final : public ProjectorControl {
   Dlpc350Options options_;
   std::unique_ptr<Device> device_;
   Clock& clock_;
+  std::atomic<bool> interrupted_{false};
   std::uint8_t sequence_ = 0;
   std::uint8_t led_enable_ = dlpc350::kSequencerControl;  // to come back to from mute
 };

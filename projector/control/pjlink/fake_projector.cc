@@ -23,11 +23,14 @@ bool is_readable(int fd) {
 
 }  // namespace
 
-FakeProjector::FakeProjector(Behaviour behaviour) : behaviour_(std::move(behaviour)) {
+FakeProjector::FakeProjector(Behaviour behaviour, int port) : behaviour_(std::move(behaviour)) {
   listener_ = UniqueFd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  const int on = 1;  // the port may be that of one that is just gone
+  VENEER_CHECK(::setsockopt(listener_.value(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on)) == 0);
   socklen_t size = sizeof(address);
   auto* const generic = reinterpret_cast<sockaddr*>(&address);
   VENEER_CHECK(::bind(listener_.value(), generic, size) == 0);

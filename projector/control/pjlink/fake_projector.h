@@ -31,7 +31,8 @@ class FakeProjector {
     int replies_a_connection = 0;
   };
 
-  explicit FakeProjector(Behaviour behaviour);
+  /// @param port  0: any that is free.
+  explicit FakeProjector(Behaviour behaviour, int port = 0);
   ~FakeProjector();
   FakeProjector(const FakeProjector&) = delete;
   FakeProjector& operator=(const FakeProjector&) = delete;

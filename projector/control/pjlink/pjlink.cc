@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "projector/control/pjlink/pjlink.h"
 
+#include <sys/eventfd.h>
+
 #include <filesystem>
 #include <fstream>
 #include <utility>
@@ -14,6 +16,26 @@ namespace {
 
 /// How often one that went on without answering is asked whether it did.
 constexpr int kPowerQuestions = 5;
+
+/// Not of a device or a pipe, and no longer than passwords are: the specification has 32.
+Result<std::string> first_line_of(const std::filesystem::path& path) {
+  constexpr std::size_t kLongest = 256;
+  std::string text(kLongest + 1, '\0');
+  std::error_code error;
+  std::ifstream stream;
+  if (std::filesystem::is_regular_file(path, error)) stream.open(path, std::ios::binary);
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  const std::size_t end = text.find_first_of("\r\n");
+  const std::string line = text.substr(0, end);
+  if (line.empty() || line.size() > kLongest)
+    return fail(Errc::kNotFound,
+                "opening the projector's control: the password cannot be read from {}; write it "
+                "there as the first line, {} characters at most",
+                path.string(),
+                kLongest);
+  return line;
+}
 
 }  // namespace
 
@@ -29,13 +51,7 @@ Result<PjlinkOptions> PjlinkOptions::read(TomlReader& config) {
       return fail(Errc::kInvalidOption,
                   "opening the projector's control: password and password_file are both set; keep "
                   "one");
-    std::ifstream stream(config.folder() / file);
-    if (!stream || !std::getline(stream, options.password))
-      return fail(Errc::kNotFound,
-                  "opening the projector's control: the password cannot be read from {}; write it "
-                  "there as the first line",
-                  (config.folder() / file).string());
-    if (options.password.ends_with('\r')) options.password.pop_back();
+    VENEER_ASSIGN(options.password, first_line_of(config.folder() / file));
   }
   double time_limit_s = to_seconds(options.time_limit);
   config.read("time_limit_s", time_limit_s);
@@ -67,7 +83,12 @@ Result<std::unique_ptr<Pjlink>> Pjlink::open(TomlReader& config, Clock& clock) {
   return std::make_unique<Pjlink>(std::move(options), clock);
 }
 
-Pjlink::Pjlink(PjlinkOptions options, Clock& clock) : options_(std::move(options)), clock_(clock) {}
+Pjlink::Pjlink(PjlinkOptions options, Clock& clock)
+    : options_(std::move(options)), clock_(clock), stop_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+  VENEER_CHECK(bool(stop_));
+}
+
+void Pjlink::interrupt() { ::eventfd_write(stop_.value(), 1); }
 
 std::string Pjlink::description() const {
   return fmt::format("PJLink projector at {}", options_.host);
@@ -76,7 +97,7 @@ std::string Pjlink::description() const {
 Status Pjlink::connect() {
   const Time deadline = SteadyClock{}.now() + options_.time_limit;
   VENEER_ASSIGN(pjlink::Connection made,
-                pjlink::Connection::open(options_.host, options_.port, deadline));
+                pjlink::Connection::open(options_.host, options_.port, deadline, stop_.value()));
   VENEER_ASSIGN(const std::string line, made.read_line(deadline));
   VENEER_ASSIGN(const pjlink::Greeting greeting, pjlink::read_greeting(line));
   digest_.clear();

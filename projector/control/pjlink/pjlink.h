@@ -9,6 +9,7 @@
 #include "base/clock.h"
 #include "base/result.h"
 #include "base/toml_reader.h"
+#include "base/unique_handle.h"
 #include "projector/control.h"
 #include "projector/control/pjlink/pjlink_connection.h"
 #include "projector/control/pjlink/pjlink_protocol.h"
@@ -45,6 +46,7 @@ class Pjlink final : public ProjectorControl {
   Pjlink(PjlinkOptions options, Clock& clock);
 
   [[nodiscard]] std::string description() const override;
+  void interrupt() override;
   [[nodiscard]] Result<ProjectorState> read_state() override;
   /// One that goes on without answering, as from standby, is asked for its power for a while.
   [[nodiscard]] Status power(bool on) override;
@@ -71,6 +73,7 @@ class Pjlink final : public ProjectorControl {
 
   PjlinkOptions options_;
   Clock& clock_;
+  UniqueFd stop_;  // an eventfd; before connection_, which borrows it
   std::optional<pjlink::Connection> connection_;
   std::string digest_;  // before the first request of the connection
   bool fresh_ = true;   // nothing was answered on the connection so far

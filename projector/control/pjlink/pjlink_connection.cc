@@ -25,35 +25,45 @@ struct FreeAddresses {
 };
 using Addresses = std::unique_ptr<addrinfo, FreeAddresses>;
 
-/// Whether one of `events` (or an error) came before the deadline.
-bool wait_for(int fd, short events, Time deadline) {
+enum class Wait { kReady, kTooLate, kStopped };
+
+/// For one of `events` (or an error) on the socket, until the deadline, while nobody says stop.
+Wait wait_for(int fd, short events, int stop, Time deadline) {
   while (true) {
     const Duration left = std::max(deadline - SteadyClock{}.now(), Duration{0});
     const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(left);
     const timespec timeout{static_cast<time_t>(seconds.count()),
                            static_cast<long>((left - seconds).count())};
-    pollfd entry{fd, events, 0};
-    const int count = ::ppoll(&entry, 1, &timeout, nullptr);
-    if (count >= 0) return count > 0;
-    if (errno != EINTR) return true;  // the call that follows says what is wrong
+    std::array<pollfd, 2> entries{pollfd{fd, events, 0}, pollfd{stop, POLLIN, 0}};
+    const int count = ::ppoll(entries.data(), entries.size(), &timeout, nullptr);
+    if (count > 0 && entries[1].revents != 0) return Wait::kStopped;
+    if (count >= 0) return count > 0 ? Wait::kReady : Wait::kTooLate;
+    if (errno != EINTR) return Wait::kReady;  // the call that follows says what is wrong
   }
 }
 
-/// 0 or an error number; EINPROGRESS where the deadline passed first.
-int connect_to(const addrinfo& address, Time deadline, UniqueFd& socket) {
+/// 0 or an error number; EINPROGRESS where the deadline passed first, ECANCELED where somebody said
+/// stop.
+int connect_to(const addrinfo& address, Time deadline, int stop, UniqueFd& socket) {
   socket = UniqueFd(
       ::socket(address.ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, address.ai_protocol));
   if (!socket) return errno;
   if (::connect(socket.value(), address.ai_addr, address.ai_addrlen) == 0) return 0;
   if (errno != EINPROGRESS && errno != EINTR) return errno;
-  if (!wait_for(socket.value(), POLLOUT, deadline)) return EINPROGRESS;
+  const Wait waited = wait_for(socket.value(), POLLOUT, stop, deadline);
+  if (waited != Wait::kReady) return waited == Wait::kStopped ? ECANCELED : EINPROGRESS;
   int error = 0;
   socklen_t size = sizeof(error);
   if (::getsockopt(socket.value(), SOL_SOCKET, SO_ERROR, &error, &size) != 0) return errno;
   return error;
 }
 
+tl::unexpected<Error> cancelled(const std::string& name) {
+  return fail(Errc::kCancelled, "speaking with {}: it was interrupted", name);
+}
+
 tl::unexpected<Error> refusal(const std::string& name, int error) {
+  if (error == ECANCELED) return cancelled(name);
   if (error == ECONNREFUSED)
     return fail(Errc::kNotFound,
                 "connecting to {}: nobody listens there; switch PJLink (\"network control\") on in "
@@ -85,7 +95,7 @@ tl::unexpected<Error> too_slow(const std::string& name, std::string_view begun) 
 
 }  // namespace
 
-Result<Connection> Connection::open(const std::string& host, int port, Time deadline) {
+Result<Connection> Connection::open(const std::string& host, int port, Time deadline, int stop) {
   const std::string name = host.find(':') == std::string::npos ? fmt::format("{}:{}", host, port)
                                                                : fmt::format("[{}]:{}", host, port);
   addrinfo hints{};
@@ -102,11 +112,12 @@ Result<Connection> Connection::open(const std::string& host, int port, Time dead
   int error = 0;
   for (const addrinfo* each = addresses.get(); each != nullptr; each = each->ai_next) {
     UniqueFd socket;
-    error = connect_to(*each, deadline, socket);
+    error = connect_to(*each, deadline, stop, socket);
+    if (error == ECANCELED) break;
     if (error != 0) continue;
     const int on = 1;
     ::setsockopt(socket.value(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
-    return Connection(std::move(socket), name);
+    return Connection(std::move(socket), stop, name);
   }
   return refusal(name, error);
 }
@@ -123,7 +134,9 @@ Status Connection::write(std::string_view bytes, Time deadline) {
     if (errno == ECONNRESET || errno == EPIPE || errno == ETIMEDOUT) return hung_up(name_);
     if (errno != EAGAIN && errno != EWOULDBLOCK)
       return fail(Errc::kIo, "speaking with {}: {}", name_, std::strerror(errno));
-    if (!wait_for(socket_.value(), POLLOUT, deadline)) return too_slow(name_, {});
+    const Wait waited = wait_for(socket_.value(), POLLOUT, stop_, deadline);
+    if (waited == Wait::kStopped) return cancelled(name_);
+    if (waited == Wait::kTooLate) return too_slow(name_, {});
   }
   return {};
 }
@@ -154,13 +167,15 @@ Result<std::string> Connection::read_line(Time deadline) {
     if (errno == EINTR) continue;
     if (errno != EAGAIN && errno != EWOULDBLOCK)
       return fail(Errc::kIo, "speaking with {}: {}", name_, std::strerror(errno));
-    if (!wait_for(socket_.value(), POLLIN, deadline)) return too_slow(name_, received_);
+    const Wait waited = wait_for(socket_.value(), POLLIN, stop_, deadline);
+    if (waited == Wait::kStopped) return cancelled(name_);
+    if (waited == Wait::kTooLate) return too_slow(name_, received_);
   }
 }
 
 bool Connection::has_news() const {
   return !(received_.empty() || received_ == "\n") ||
-         wait_for(socket_.value(), POLLIN, SteadyClock{}.now());
+         wait_for(socket_.value(), POLLIN, stop_, SteadyClock{}.now()) == Wait::kReady;
 }
 
 }  // namespace veneer::projector::pjlink

@@ -13,22 +13,28 @@ namespace veneer::projector::pjlink {
 /// Lines over TCP, every wait bounded. Deadlines are on CLOCK_MONOTONIC.
 class Connection {
  public:
-  /// Errors: kNotFound (no such name, nobody listens, no way there, no answer), kIo.
-  [[nodiscard]] static Result<Connection> open(const std::string& host, int port, Time deadline);
-  /// Errors: kTimeout, kDisconnected, kIo; all final.
+  /// @param stop  becomes readable when every wait shall end with kCancelled; borrowed, must
+  ///              outlive the connection. The look-up of a name is not a wait of ours.
+  /// Errors: kNotFound (no such name, nobody listens, no way there, no answer), kIo, kCancelled.
+  [[nodiscard]] static Result<Connection> open(const std::string& host,
+                                               int port,
+                                               Time deadline,
+                                               int stop);
+  /// Errors: kTimeout, kDisconnected, kIo, kCancelled; all final.
   [[nodiscard]] Status write(std::string_view bytes, Time deadline);
   /// The next line, without its CR (nor the LF that some devices add to it). Errors: kTimeout and
-  /// kDisconnected (both also for a line that was begun), kBadFormat (one too long), kIo; all
-  /// final.
+  /// kDisconnected (both also for a line that was begun), kBadFormat (one too long), kIo,
+  /// kCancelled; all final.
   [[nodiscard]] Result<std::string> read_line(Time deadline);
   /// Whether something came that no read_line() has returned: an answer that nobody waits for any
   /// more, or the end of the connection.
   [[nodiscard]] bool has_news() const;
 
  private:
-  Connection(UniqueFd socket, std::string name)
-      : socket_(std::move(socket)), name_(std::move(name)) {}
+  Connection(UniqueFd socket, int stop, std::string name)
+      : socket_(std::move(socket)), stop_(stop), name_(std::move(name)) {}
   UniqueFd socket_;
+  int stop_;
   std::string name_;  // "TCP host:port", for texts
   std::string received_;
 };

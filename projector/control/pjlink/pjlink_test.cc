@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <thread>
 
 #include "projector/control/pjlink/fake_projector.h"
 
@@ -377,6 +378,27 @@ TEST_F(PjlinkConversation, Class1HasNoFreezeAndSaysSo) {
   ASSERT_FALSE(done);
   EXPECT_EQ(done.error().code, Errc::kUnavailable);
   EXPECT_THAT(projector.conversations(), ElementsAre("%1CLSS ?\r"));
+}
+
+TEST_F(PjlinkConversation, InterruptEndsTheCallUnderWayAndEveryLaterOne) {
+  FakeProjector::Behaviour silent = class_1();
+  silent.replies["%1AVMT 11\r"] = "...";
+  FakeProjector projector(silent);
+  limit_ = 60s;
+  Pjlink control = this->control(projector);
+  std::thread other([&] {
+    while (projector.conversations().empty() || projector.conversations().back().empty())
+      std::this_thread::sleep_for(1ms);
+    control.interrupt();
+  });
+  const auto start = std::chrono::steady_clock::now();
+  const Status done = control.mute(true);
+  other.join();
+  EXPECT_LT(std::chrono::steady_clock::now() - start, 5s);  // far below the time limit
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().code, Errc::kCancelled);
+  EXPECT_EQ(control.mute(false).error().code, Errc::kCancelled);
+  EXPECT_EQ(control.read_state().error().code, Errc::kCancelled);
 }
 
 TEST_F(PjlinkConversation, NobodyThereIsNotFoundWithARemedy) {
