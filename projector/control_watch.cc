@@ -11,6 +11,18 @@ constexpr double kLeastPeriod_s = 1;
 constexpr double kLeastPeriodOverNetwork_s = 10;
 constexpr double kMostPeriod_s = 3600;
 
+/// Without the changes.
+ControlReport report_of(const ProjectorState& state, const std::string& description) {
+  ControlReport report;
+  report.asked = true;
+  report.reachable = true;
+  report.text = description + ": " + summary_of(state);
+  report.warnings = warnings(state);
+  report.state = state;
+  report.read = SteadyClock{}.now();
+  return report;
+}
+
 }  // namespace
 
 ControlWatchOptions ControlWatchOptions::read(TomlReader& control_table) {
@@ -42,6 +54,20 @@ Status ControlWatchOptions::check() const {
   return fail(Errc::kInvalidOption,
               "watching the projector: its period and its pauses must be above 0, and the longest "
               "pause no shorter than the first");
+}
+
+ControlReport look_at(ProjectorControl& control, const ControlRecord& kept) {
+  const Result<ProjectorState> state = control.read_state();
+  ControlReport report;
+  if (state) {
+    report = report_of(*state, control.description());
+    report.changes = differences(kept, to_record(*state));
+  } else {
+    report.asked = true;
+    report.failures = 1;
+    report.text = state.error().what;
+  }
+  return report;
 }
 
 ControlWatch::ControlWatch(Open open, const ControlRecord& kept, const ControlWatchOptions& options)
@@ -113,13 +139,7 @@ Duration ControlWatch::pause() const {
 }
 
 void ControlWatch::tell(const ProjectorState& state, const std::string& description) {
-  ControlReport report;
-  report.asked = true;
-  report.reachable = true;
-  report.text = description + ": " + summary_of(state);
-  report.warnings = warnings(state);
-  report.state = state;
-  report.read = SteadyClock{}.now();
+  ControlReport report = report_of(state, description);
   const ControlRecord now = to_record(state);
   const std::lock_guard lock(mutex_);
   report.changes = differences(kept_, now);

@@ -50,6 +50,9 @@ struct ControlReport {
   int failures = 0;                     ///< in a row, up to now
 };
 
+/// Asks once. A failure is in the report too; then it has no state.
+[[nodiscard]] ControlReport look_at(ProjectorControl& control, const ControlRecord& kept);
+
 /// Watches a projector on a thread of its own, for as long as it lives: whether it can be reached,
 /// and whether it is still as it was when the profile was measured. It is opened for every question
 /// and closed after it: many projectors speak with one program at a time, and a person may want to

@@ -14,6 +14,7 @@
 
 #include "base/exit_code.h"
 #include "cli/commands/commands.h"
+#include "projector/control/pjlink/pjlink_search.h"
 #include "projector/control_watch.h"
 #include "projector/controls.h"
 
@@ -154,6 +155,22 @@ Result<int> status(CommandLine& line, ProjectorControl& control, const Projector
   return kExitDone;
 }
 
+Result<int> search(CommandLine& line, const projector::pjlink::SearchOptions& options) {
+  VENEER_ASSIGN(const auto found, projector::pjlink::search(options));
+  ordered_json json{{"projectors", ordered_json::array()}};
+  std::string text;
+  for (const auto& each : found) {
+    json["projectors"].push_back({{"host", each.address}, {"mac", each.mac}});
+    text += fmt::format("{}{:<15}  {}", text.empty() ? "" : "\n", each.address, each.mac);
+  }
+  if (found.empty())
+    text =
+        "No projector answered. Those of PJLink class 1 never do, nor those beyond this network; "
+        "look for the address in the projector's own menu.";
+  line.print(json, text);
+  return kExitDone;
+}
+
 using Act = Status (*)(ProjectorControl&, const ProjectorOptions&);
 struct Action {
   const char* name;
@@ -232,6 +249,16 @@ Result<int> run_projector(CommandLine& line) {
       app.add_subcommand("status", "Say how it is, and what would spoil colours")->fallthrough();
   asked->add_option("--watch", options.watch_s, "Again every 2 s, for so many seconds")
       ->check(CLI::Range(0.0, 1e6));
+  projector::pjlink::SearchOptions wanted;
+  double wait_s = to_seconds(wanted.wait);
+  CLI::App* const searched =
+      app.add_subcommand("search", "Look for PJLink projectors of class 2 on the network");
+  searched->add_option("--address", wanted.address, "The network's broadcast address")
+      ->capture_default_str();
+  searched->add_option("--search-port", wanted.port, "Where 4352 is not it")->capture_default_str();
+  searched->add_option("--wait", wait_s, "Seconds for answers")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 60.0));
   const auto add = [&](const Action& each) {
     CLI::App* const added = app.add_subcommand(each.name, each.summary)->fallthrough();
     added->callback([&action, &each] { action = &each; });
@@ -242,6 +269,10 @@ Result<int> run_projector(CommandLine& line) {
   add(kPattern)->add_option("pattern", options.value, "As solid or step-bars")->required();
   add(kLeds)->add_option("levels", options.levels, "Red, green, blue")->expected(3)->required();
   line.parse();
+  if (searched->parsed()) {
+    wanted.wait = from_seconds(wait_s);
+    return search(line, wanted);
+  }
   SteadyClock clock;
   VENEER_ASSIGN(const std::unique_ptr<ProjectorControl> control, open_control(options, clock));
   return action == nullptr ? status(line, *control, options)

@@ -58,6 +58,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (name)
     law(pjlink::input_code(*name) == std::string(parameter), "an input's name is another's");
   has_text(pjlink::input_code(parameter));
+  const auto mac = pjlink::read_acknowledgement(line);
+  has_text(mac);
+  if (mac) law(pjlink::read_acknowledgement("%2ACKN=" + *mac + "\r") == mac, "another address");
   const std::string text = pjlink::readable(line);
   law(text.size() <= line.size() && pjlink::readable(text) == text,
       "a text does not stay readable");

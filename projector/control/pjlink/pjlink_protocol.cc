@@ -199,6 +199,22 @@ Result<std::string> input_code(std::string_view name) {
               readable(name));
 }
 
+Result<std::string> read_acknowledgement(std::string_view datagram) {
+  constexpr std::string_view kHead = "%2ACKN=";
+  constexpr std::string_view kShape = "00:00:00:00:00:00";
+  std::string_view line = datagram;
+  while (line.ends_with('\n') || line.ends_with('\r')) line.remove_suffix(1);
+  std::string mac(line.starts_with(kHead) ? line.substr(kHead.size()) : "");
+  bool good = mac.size() == kShape.size();
+  for (std::size_t i = 0; good && i < mac.size(); ++i)
+    good = kShape[i] == ':' ? mac[i] == ':' : is_hex(mac[i]);
+  if (!good) return not_understood("the answer to a search", line);
+  std::ranges::transform(mac, mac.begin(), [](char c) {
+    return c >= 'A' && c <= 'F' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  return mac;
+}
+
 std::string readable(std::string_view text) {
   std::string result;
   while (!text.empty()) {

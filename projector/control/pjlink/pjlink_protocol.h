@@ -71,6 +71,10 @@ struct Reply {
 /// (class 2); numbers 1 to 9, and A to Z in class 2. Errors: kInvalidOption.
 [[nodiscard]] Result<std::string> input_code(std::string_view name);
 
+/// What a projector of class 2 answers to a search, a datagram: its MAC address, in lower case.
+/// Errors: kBadFormat.
+[[nodiscard]] Result<std::string> read_acknowledgement(std::string_view datagram);
+
 /// A text for people: UTF-8 as it came, bytes that are none of it as '?'.
 [[nodiscard]] std::string readable(std::string_view text);
 

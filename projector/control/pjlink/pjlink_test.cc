@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <chrono>
+#include <string>
 #include <thread>
 
 #include "projector/control/pjlink/fake_projector.h"
@@ -148,6 +150,155 @@ TEST_F(PjlinkConversation, EveryRefusalOfACommandSaysWhatToDo) {
   projector.reply("%1INPT 31\r", "%1INPT=OK\r");
   EXPECT_TRUE(control.select_input("31"));
   EXPECT_EQ(projector.conversations().size(), 1U);  // a refusal is no reason to hang up
+}
+
+struct Asked {
+  const char* request;  // without its CR
+  bool (*is_empty)(const ProjectorState&);
+};
+constexpr std::array kAsked{
+    Asked{"%1POWR ?", [](const ProjectorState& s) { return s.power == Power::kUnknown; }},
+    Asked{"%2INPT ?", [](const ProjectorState& s) { return !s.input; }},
+    Asked{"%1AVMT ?", [](const ProjectorState& s) { return !s.muted; }},
+    Asked{"%1ERST ?", [](const ProjectorState& s) { return !s.health.contains("fan"); }},
+    Asked{"%1LAMP ?", [](const ProjectorState& s) { return !s.lamps; }},
+    Asked{"%1INF1 ?", [](const ProjectorState& s) { return !s.maker; }},
+    Asked{"%1INF2 ?", [](const ProjectorState& s) { return !s.model; }},
+    Asked{"%1NAME ?", [](const ProjectorState& s) { return !s.name; }},
+    Asked{"%2FREZ ?", [](const ProjectorState& s) { return !s.frozen; }},
+    Asked{"%2SNUM ?", [](const ProjectorState& s) { return !s.serial; }},
+    Asked{"%2SVER ?", [](const ProjectorState& s) { return !s.firmware; }}};
+
+std::string reply_to(const std::string& request, const std::string& parameter) {
+  return request.substr(0, 6) + "=" + parameter + "\r";
+}
+
+TEST_F(PjlinkConversation, EveryRefusalOfEveryQuestionLeavesThatOneValueEmpty) {
+  for (const Asked& asked : kAsked) {
+    const std::string request = asked.request;
+    FakeProjector projector(class_2());
+    for (int refusal = 1; refusal <= 4; ++refusal) {
+      projector.reply(request + "\r", reply_to(request, fmt::format("ERR{}", refusal)));
+      const auto state = this->control(projector).read_state();
+      ASSERT_TRUE(state) << request << " " << state.error().what;
+      for (const Asked& other : kAsked)
+        EXPECT_EQ(other.is_empty(*state), other.request == asked.request)
+            << other.request << " beside " << request;
+      const bool failed =
+          state->health.contains("other") && state->health.at("other") == Health::kError;
+      EXPECT_EQ(failed, refusal == 4) << request << " ERR" << refusal;
+    }
+    for (const char* wrong : {"ERRA", "ERR0", "ERR5"}) {
+      projector.reply(request + "\r", reply_to(request, wrong));
+      const auto state = this->control(projector).read_state();
+      // Names are texts, and a projector may well be called ERR5.
+      const bool is_text = request.find("INF") == 2 || request.find("NAME") == 2 ||
+                           request.find("SNUM") == 2 || request.find("SVER") == 2;
+      if (is_text && std::string(wrong) != "ERRA") {
+        EXPECT_TRUE(state) << request << wrong;
+        continue;
+      }
+      ASSERT_FALSE(state) << request << wrong;
+      EXPECT_EQ(state.error().code,
+                std::string(wrong) == "ERRA" ? Errc::kInvalidOption : Errc::kBadFormat);
+    }
+  }
+}
+
+TEST_F(PjlinkConversation, EveryRefusalOfEveryCommandIsTold) {
+  struct Command {
+    const char* request;  // without its CR
+    Status (*act)(Pjlink&);
+  };
+  const std::array commands{
+      Command{"%1POWR 1", [](Pjlink& c) { return c.power(true); }},
+      Command{"%1POWR 0", [](Pjlink& c) { return c.power(false); }},
+      Command{"%1AVMT 11", [](Pjlink& c) { return c.mute(true); }},
+      Command{"%1AVMT 10", [](Pjlink& c) { return c.mute(false); }},
+      Command{"%2FREZ 1", [](Pjlink& c) { return c.freeze(true); }},
+      Command{"%2FREZ 0", [](Pjlink& c) { return c.freeze(false); }},
+      Command{"%2INPT 3A", [](Pjlink& c) { return c.select_input("digitalA"); }}};
+  constexpr std::array kExpected{std::pair{"ERR1", Errc::kUnavailable},
+                                 std::pair{"ERR2", Errc::kInvalidOption},
+                                 std::pair{"ERR3", Errc::kUnavailable},
+                                 std::pair{"ERR4", Errc::kIo},
+                                 std::pair{"ERRA", Errc::kInvalidOption},
+                                 std::pair{"ERR5", Errc::kBadFormat},
+                                 std::pair{"ok", Errc::kBadFormat}};
+  for (const Command& command : commands) {
+    const std::string request = command.request;
+    FakeProjector projector(class_2());
+    for (const auto& [parameter, code] : kExpected) {
+      projector.reply(request + "\r", reply_to(request, parameter));
+      for (const char* both : {"%1AVMT 31\r", "%1AVMT 30\r"})
+        projector.reply(both, reply_to(request, parameter));
+      Pjlink control = this->control(projector);
+      const Status done = command.act(control);
+      ASSERT_FALSE(done) << request << " " << parameter;
+      EXPECT_EQ(done.error().code, code)
+          << request << " " << parameter << ": " << done.error().what;
+    }
+    projector.reply(request + "\r", reply_to(request, "OK"));
+    Pjlink control = this->control(projector);
+    EXPECT_TRUE(command.act(control)) << request;
+  }
+}
+
+TEST_F(PjlinkConversation, OnlyAGreetingIsTakenForOne) {
+  FakeProjector projector(class_1());
+  const auto greeted = [&](const std::string& greeting) {
+    projector.greet(greeting);
+    return this->control(projector, "secret").mute(true);
+  };
+  EXPECT_TRUE(greeted("PJLINK 0\r"));
+  EXPECT_TRUE(greeted("PJLINK 1 0123ABCD\r"));
+  for (const char* wrong : {"PJLINK 2\r",
+                            "PJLINK 0 \r",
+                            "PJLINK 1\r",
+                            "PJLINK 1 \r",
+                            "PJLINK 1 0123abc\r",
+                            "PJLINK 1 0123abcde\r",
+                            "PJLINK 1 0123abcg\r",
+                            "pjlink 0\r",
+                            " PJLINK 0\r",
+                            "PJLINK ERR1\r",
+                            "%1AVMT=OK\r"}) {
+    const Status done = greeted(wrong);
+    ASSERT_FALSE(done) << wrong;
+    EXPECT_EQ(done.error().code, Errc::kBadFormat) << wrong << done.error().what;
+  }
+  const Status refused = greeted("PJLINK ERRA\r");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, Errc::kInvalidOption);
+}
+
+TEST_F(PjlinkConversation, OneThatHangsUpInTheMiddleOfALineIsReported) {
+  for (const char* half : {"%", "%1AVMT", "%1AVMT=OK"}) {
+    FakeProjector::Behaviour behaviour = class_1();
+    behaviour.replies_a_connection = 1;
+    behaviour.replies["%1AVMT 11\r"] = half;
+    FakeProjector projector(behaviour);
+    const Status done = this->control(projector).mute(true);
+    ASSERT_FALSE(done) << half;
+    EXPECT_EQ(done.error().code, Errc::kDisconnected);
+  }
+}
+
+TEST_F(PjlinkConversation, AReplyOfAnotherClassIsNoReply) {
+  FakeProjector projector(class_2());
+  projector.reply("%1AVMT 11\r", "%2AVMT=OK\r");
+  EXPECT_EQ(this->control(projector).mute(true).error().code, Errc::kBadFormat);
+  projector.reply("%2FREZ 0\r", "%1FREZ=OK\r");
+  EXPECT_EQ(this->control(projector).freeze(false).error().code, Errc::kBadFormat);
+}
+
+TEST_F(PjlinkConversation, WhoeverSendsForEverIsNotListenedTo) {
+  FakeProjector::Behaviour flood = class_1();
+  flood.greeting = std::string(4U << 20U, 'x');
+  FakeProjector projector(flood);
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_EQ(this->control(projector).mute(true).error().code, Errc::kBadFormat);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, 2s);
 }
 
 TEST_F(PjlinkConversation, ALaserHasNoLampsAndOneInStandbyNoInput) {
