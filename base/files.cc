@@ -122,6 +122,10 @@ Result<std::string> read_text(const fs::path& path) {
     const Errc code = errno == ENOENT ? Errc::kNotFound : Errc::kIo;
     return fail(code, "reading {}: {}", path.string(), system_message(errno));
   }
+  // Without an end, as /dev/zero has none, a text would take all memory there is.
+  struct stat info {};
+  if (::fstat(fd.value(), &info) == 0 && (S_ISCHR(info.st_mode) || S_ISBLK(info.st_mode)))
+    return fail(Errc::kIo, "reading {}: it is a device; name a file", path.string());
   std::string text;
   std::array<char, 65536> buffer;
   for (;;) {

@@ -19,6 +19,14 @@ std::size_t entries(const fs::path& folder) {
   return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder), {}));
 }
 
+TEST(ReadText, RefusesADeviceWhoseTextHasNoEnd) {
+  for (const char* device : {"/dev/zero", "/dev/null"}) {
+    const auto text = read_text(device);
+    ASSERT_FALSE(text) << device;
+    EXPECT_NE(text.error().what.find("device"), std::string::npos);
+  }
+}
+
 TEST(WriteText, RoundTripsAndMakesFolders) {
   const TemporaryFolder folder;
   const fs::path path = folder.path() / "a" / "b.txt";

@@ -155,6 +155,10 @@ Result<Mesh> load_mesh(const std::filesystem::path& path_or_name) {
                 "sphere and vase",
                 origin);
   }
+  // A pipe or a device would be read for ever.
+  if (std::error_code error; !std::filesystem::is_regular_file(path_or_name, error))
+    return fail(
+        Errc::kBadFormat, "reading the mesh {}: it is a folder or a device; name a file", origin);
   Assimp::Importer importer;
   // FlipUVs: files count v from the bottom of the texture, Veneer from its first row. SortByPType:
   // points and lines become parts of their own, which may lack texture coordinates and normals.

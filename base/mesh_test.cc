@@ -98,6 +98,15 @@ TEST(LoadMesh, PassesOverLinesBesideItsTriangles) {
   }
 }
 
+TEST(LoadMesh, DoesNotReadADeviceForEver) {
+  for (const char* device : {"/dev/zero", "/dev"}) {
+    const auto mesh = load_mesh(device);
+    ASSERT_FALSE(mesh) << device;
+    EXPECT_EQ(mesh.error().code, Errc::kBadFormat);
+    EXPECT_NE(mesh.error().what.find("device"), std::string::npos);
+  }
+}
+
 TEST(LoadMesh, RefusesMissingEmptyAndForeignFiles) {
   const TemporaryFolder folder;
   EXPECT_EQ(load_mesh("no-such-mesh.obj").error().code, Errc::kNotFound);

@@ -40,6 +40,51 @@ std::optional<double> number(const toml::node& node) {
 
 }  // namespace
 
+namespace {
+
+/// The end of the string that begins at `begin` with a quote of either kind.
+std::size_t end_of_string(std::string_view text, std::size_t begin) {
+  const char quote = text[begin];
+  const std::string triple(3, quote);
+  const bool long_one = text.substr(begin, 3) == triple;
+  std::size_t i = begin + (long_one ? 3 : 1);
+  while (i < text.size()) {
+    if (text[i] == '\\' && quote == '"') {
+      i += 2;
+    } else if (long_one && text.substr(i, 3) == triple) {
+      i += 3;
+      // Up to two more of them are its contents.
+      for (int more = 0; more < 2 && i < text.size() && text[i] == quote; ++more) ++i;
+      return i;
+    } else if (!long_one && (text[i] == quote || text[i] == '\n')) {
+      return i + 1;
+    } else {
+      ++i;
+    }
+  }
+  return text.size();
+}
+
+/// Where a character beyond ASCII stands outside of strings and comments. TOML has none there, and
+/// toml++ 3.3 has undefined behaviour (is_non_ascii_horizontal_whitespace) for most of them.
+std::optional<std::size_t> find_foreign(std::string_view text) {
+  std::size_t i = text.starts_with("\xEF\xBB\xBF") ? 3 : 0;  // a byte order mark
+  while (i < text.size()) {
+    if (text[i] == '#') {
+      i = std::min(text.find('\n', i), text.size());
+    } else if (text[i] == '"' || text[i] == '\'') {
+      i = end_of_string(text, i);
+    } else if (static_cast<unsigned char>(text[i]) >= 0x80) {
+      return i;
+    } else {
+      ++i;
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
 struct TomlReader::Node {
   const toml::table* table;  // into the document; nullptr for an absent table
   std::string path;          // "light." for messages
@@ -81,6 +126,9 @@ Result<TomlReader> TomlReader::open(const std::filesystem::path& path,
   VENEER_ASSIGN(TomlReader reader, parse(text, path.string()));
   reader.document_->folder = path.parent_path();
   for (const std::string& line : overrides) {
+    if (find_foreign(line))
+      return fail(
+          Errc::kInvalidOption, "reading the setting '{}': put what is not ASCII in quotes", line);
     toml::parse_result parsed = toml::parse(line);
     if (!parsed) {
       return fail(
@@ -95,6 +143,12 @@ Result<TomlReader> TomlReader::open(const std::filesystem::path& path,
 }
 
 Result<TomlReader> TomlReader::parse(std::string_view text, std::string_view origin) {
+  if (const auto foreign = find_foreign(text))
+    return fail(Errc::kInvalidOption,
+                "{}:{}: a character that is not ASCII stands outside of quotes; put the key or "
+                "value in quotes",
+                origin,
+                1 + std::ranges::count(text.substr(0, *foreign), '\n'));
   toml::parse_result parsed = toml::parse(text, origin);
   if (!parsed) {
     return fail(Errc::kInvalidOption,

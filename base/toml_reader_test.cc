@@ -31,6 +31,34 @@ TEST(TomlReader, ReadsWhatIsThereAndLeavesDefaults) {
   EXPECT_EQ(lux, 2.5);
 }
 
+TEST(TomlReader, LettersBeyondAsciiStandInQuotesAndComments) {
+  for (const char* good : {"name = \"T\u00fcr\"  # T\u00fcr\n",
+                           "\xEF\xBB\xBFname = 'T\u00fcr'\n",
+                           "name = \"\"\"a \"\u00fc\" \\\" \u00fc\"\"\"\"\n",
+                           "name = \'\'\'\u00fc\n\'\'\u00fc\'\'\'\'\'\n# \u00fc",
+                           "\"name\" = \"\\\"\u00fc\"\n"}) {
+    auto toml = TomlReader::parse(good, "t");
+    ASSERT_TRUE(toml) << good << toml.error().what;
+    std::string name;
+    toml->read("name", name);
+    EXPECT_NE(name.find("\u00fc"), std::string::npos) << good;
+    EXPECT_TRUE(toml->finish()) << good;
+  }
+  // Most of these once ran into what toml++ takes to be impossible.
+  for (const char* wrong : {"a = 1\nna\u00efve = 1\n",
+                            "a = 1\nb = \u00fc\n",
+                            "a = 1\nw\u03fb = 2\n",
+                            "a = '1'\n\u00a0b = 2\n",
+                            "a = \"\"\"1\"\"\"\n\u3000",
+                            "# \u00fc\n\xff"}) {
+    const auto toml = TomlReader::parse(wrong, "t");
+    ASSERT_FALSE(toml) << wrong;
+    EXPECT_EQ(toml.error().code, Errc::kInvalidOption);
+    EXPECT_NE(toml.error().what.find("t:2: a character that is not ASCII"), std::string::npos)
+        << toml.error().what;
+  }
+}
+
 TEST(TomlReader, NamesUnknownKeysWithLineAndNearestOne) {
   TomlReader toml =
       TomlReader::parse("frames = 1\n[light]\nilluminance = 3\n", "demo.toml").value();

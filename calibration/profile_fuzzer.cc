@@ -7,9 +7,9 @@
 #include <string>
 
 #include "base/files.h"
+#include "base/testing/fuzzing.h"
 #include "base/testing/temporary_folder.h"
 #include "calibration/profile.h"
-#include "calibration/testing/fuzzing.h"
 
 namespace veneer::calibration {
 namespace {
@@ -62,10 +62,10 @@ std::string read(std::string_view text) {
 }
 
 }  // namespace
+}  // namespace veneer::calibration
 
-const FuzzedReader& fuzzed_reader() {
+const veneer::FuzzedReader& veneer::fuzzed_reader() {
+  using namespace calibration;
   static const FuzzedReader kReader{&read, {read_text(folder() / "profile.json").value_or("{}")}};
   return kReader;
 }
-
-}  // namespace veneer::calibration

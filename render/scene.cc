@@ -23,6 +23,14 @@ bool is_built_in(std::string_view mesh) {
   return std::ranges::find(kBuiltIn, mesh) != kBuiltIn.end();
 }
 
+// Far beyond any hall; single precision still tells tenths of a millimetre apart there.
+constexpr double kMostMetres = 1000.0;
+
+bool is_near(const Eigen::Vector3d& x) {
+  return x.allFinite() && x.cwiseAbs().maxCoeff() <= kMostMetres;
+}
+constexpr std::string_view kNear = "must be finite, and from -1000 to 1000 metres";
+
 // A finite value in [0, kMaxLight].
 bool is_amount_of_light(double value) { return value >= 0.0 && value <= kMaxLight; }
 
@@ -34,13 +42,19 @@ Light read_light(TomlReader& toml) {
   if (!colour.allFinite() || colour.minCoeff() < 0.0)
     toml.add_error("colour", "must be three finite numbers, none below 0");
   double amount = 0.0;
+  // Each may be in range, and both together out of that of half floats, which would be white.
+  const auto check_product = [&toml](const Eigen::Vector3d& rgb) {
+    if (!(rgb.maxCoeff() <= kMaxLight))
+      toml.add_error("colour", "times the amount of light must be at most 1e7");
+  };
   if (kind == "point") {
     PointLight light;
     toml.require("position", light.position);
-    if (!light.position.allFinite()) toml.add_error("position", "must be finite");
+    if (!is_near(light.position)) toml.add_error("position", kNear);
     toml.require("intensity_cd", amount);
     if (!is_amount_of_light(amount)) toml.add_error("intensity_cd", "must be from 0 to 1e7");
     light.intensity_rgb = amount * colour;
+    check_product(light.intensity_rgb);
     return light;
   }
   if (kind != "directional") toml.add_error("kind", "must be \"directional\" or \"point\"");
@@ -55,13 +69,13 @@ Light read_light(TomlReader& toml) {
   toml.require("illuminance_lux", amount);
   if (!is_amount_of_light(amount)) toml.add_error("illuminance_lux", "must be from 0 to 1e7");
   light.illuminance_rgb = amount * colour;
+  check_product(light.illuminance_rgb);
   return light;
 }
 
 void read_object(TomlReader toml, Scene& scene) {
   toml.read("position", scene.world_from_object.translation);
-  if (!scene.world_from_object.translation.allFinite())
-    toml.add_error("position", "must be finite");
+  if (!is_near(scene.world_from_object.translation)) toml.add_error("position", kNear);
   Eigen::Vector3d rotation_deg = Eigen::Vector3d::Zero();
   toml.read("rotation_deg", rotation_deg);
   if (!rotation_deg.allFinite()) toml.add_error("rotation_deg", "must be finite");
@@ -82,7 +96,7 @@ Eigen::Vector3d read_eye(TomlReader& toml) {
   const auto point = [&](std::string_view key) {
     Eigen::Vector3d value = Eigen::Vector3d::Zero();
     toml.read(key, value);
-    if (!value.allFinite()) toml.add_error(key, "must be finite");
+    if (!is_near(value)) toml.add_error(key, kNear);
     return value;
   };
   std::string eye;

@@ -102,6 +102,24 @@ TEST_F(SceneTest, RefusesWhatItDoesNotKnow) {
   expect_refused(plate + "[object]\ntracker_body = -2\n" + kLight, {"tracker_body"});
 }
 
+TEST_F(SceneTest, WhatThePictureCannotHoldIsRefused) {
+  const std::string plate = "mesh = \"plate\"\n";
+  const std::string sun = plate + "[[light]]\ndirection = [0, 0, 1]\nilluminance_lux = ";
+  const std::string lamp = plate + "[[light]]\nkind = \"point\"\nposition = ";
+  // The amount and the colour are each in range; what counts is their product.
+  EXPECT_TRUE(load(sun + "1e7\ncolour = [1, 1, 1]\n"));
+  EXPECT_TRUE(load(sun + "1e6\ncolour = [10, 1, 1]\n"));
+  expect_refused(sun + "1e7\ncolour = [1, 1.001, 1]\n", {"colour", "1e7"});
+  expect_refused(sun + "1\ncolour = [1e308, 1, 1]\n", {"colour", "1e7"});
+  expect_refused(lamp + "[0, 0, 1]\nintensity_cd = 1e7\ncolour = [2, 0, 0]\n", {"colour", "1e7"});
+  // Nor what single precision cannot.
+  EXPECT_TRUE(load(lamp + "[1000, -1000, 0]\nintensity_cd = 1\n"));
+  expect_refused(lamp + "[1000.1, 0, 0]\nintensity_cd = 1\n", {"position", "1000"});
+  expect_refused(plate + "[object]\nposition = [0, 0, -1e300]\n" + kLight, {"position", "1000"});
+  expect_refused(plate + "[observer]\neye_in_sensor = [0, 1e39, 0]\n" + kLight,
+                 {"eye_in_sensor", "1000"});
+}
+
 TEST_F(SceneTest, OneEyeOrTheMiddleOfTwo) {
   const std::string plate = "mesh = \"plate\"\n[observer]\n";
   const std::string left = "left_eye_in_sensor = [-0.03, 0.01, 0]\n";

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The body of every fuzzer of texts: what a reader makes of whatever libFuzzer comes up with.
-#include "calibration/testing/fuzzing.h"
+#include "base/testing/fuzzing.h"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 #include <filesystem>
 #include <fstream>
 
-using namespace veneer::calibration;
+using namespace veneer;
 
 extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv);
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-namespace veneer::calibration {
+namespace veneer {
 
 /// What a fuzzer feeds. A fuzzer is fuzzing.cc and a file that defines fuzzed_reader().
 struct FuzzedReader {
@@ -17,4 +17,4 @@ struct FuzzedReader {
 };
 [[nodiscard]] const FuzzedReader& fuzzed_reader();
 
-}  // namespace veneer::calibration
+}  // namespace veneer

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 
+#include "base/testing/fuzzing.h"
 #include "calibration/exchange/cgats.h"
-#include "calibration/testing/fuzzing.h"
 
 namespace veneer::calibration {
 namespace {
@@ -38,8 +38,10 @@ std::string read(std::string_view text) {
 }
 
 }  // namespace
+}  // namespace veneer::calibration
 
-const FuzzedReader& fuzzed_reader() {
+const veneer::FuzzedReader& veneer::fuzzed_reader() {
+  using namespace calibration;
   static const FuzzedReader kReader{
       &read,
       {"CTI3\n\nDESCRIPTOR \"test\"\nDEVICE_CLASS \"DISPLAY\"\nCOLOR_REP \"RGB_XYZ\"\n"
@@ -54,5 +56,3 @@ const FuzzedReader& fuzzed_reader() {
        "1 2 3\n0 5 6\n0 0 9\nEND_DATA\n"}};
   return kReader;
 }
-
-}  // namespace veneer::calibration

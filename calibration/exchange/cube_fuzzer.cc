@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "base/testing/fuzzing.h"
 #include "calibration/exchange/cube.h"
-#include "calibration/testing/fuzzing.h"
 
 namespace veneer::calibration {
 namespace {
@@ -20,8 +20,10 @@ std::string read(std::string_view text) {
 }
 
 }  // namespace
+}  // namespace veneer::calibration
 
-const FuzzedReader& fuzzed_reader() {
+const veneer::FuzzedReader& veneer::fuzzed_reader() {
+  using namespace calibration;
   static const FuzzedReader kReader{
       &read,
       {"TITLE \"t\"\nLUT_3D_SIZE 2\nDOMAIN_MIN 0 0 0\nDOMAIN_MAX 1 1 1\n0 0 0\n1 0 0\n0 1 0\n"
@@ -29,5 +31,3 @@ const FuzzedReader& fuzzed_reader() {
        "LUT_1D_SIZE 2\r\nLUT_1D_INPUT_RANGE 0.0 1.0\r\n# c\r\n0 0 0\r\n1e0 .5 -1\r\n"}};
   return kReader;
 }
-
-}  // namespace veneer::calibration

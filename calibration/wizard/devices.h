@@ -12,6 +12,7 @@
 #include "calibration/patch_display.h"
 #include "calibration/wizard/operator.h"
 #include "capture/camera.h"
+#include "projector/control.h"
 #include "tracking/synchronised.h"
 
 namespace veneer::calibration {
@@ -44,9 +45,10 @@ struct Devices {
   Colorimeter* colorimeter = nullptr;
   Operator* hands = nullptr;
   Clock* clock = nullptr;
-  capture::Camera* camera = nullptr;  ///< null: geometry comes from elsewhere
-  PoseProbe* board_sensor = nullptr;  ///< null: nothing tracks the board
-  PointProbe* stylus = nullptr;       ///< null: nothing can be touched
+  capture::Camera* camera = nullptr;               ///< null: geometry comes from elsewhere
+  PoseProbe* board_sensor = nullptr;               ///< null: nothing tracks the board
+  PointProbe* stylus = nullptr;                    ///< null: nothing can be touched
+  projector::ProjectorControl* control = nullptr;  ///< null: the projector cannot be asked
   /// Called when a step begins, and after one failed: what was moved meanwhile is not where it was.
   std::function<void()> begin_step;
   /// Whether the instrument gets to any spot by itself; else a person points it, and is asked for

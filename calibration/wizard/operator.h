@@ -18,8 +18,9 @@ enum class Task {
   kUncoverLens,
   kPlaceBoard,  ///< the chequered board for the camera, in pose number `index`
   kRemoveBoard,
-  kTouch,      ///< landmark number `index` of the object, with the tracked stylus
-  kTouchSpot,  ///< the cross-hair that the projector shows at `pixel`, with the stylus
+  kTouch,           ///< landmark number `index` of the object, with the tracked stylus
+  kSeeToProjector,  ///< to a setting of the projector's own that may spoil colours; or go on
+  kTouchSpot,       ///< the cross-hair that the projector shows at `pixel`, with the stylus
 };
 
 struct Request {

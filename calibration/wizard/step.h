@@ -86,6 +86,8 @@ struct WizardResults {
   std::optional<geometry::PointRegistration> object;
   std::vector<geometry::PixelTouch> cross_hairs;  ///< that were touched
   std::optional<ProfileVerification> verification;
+  /// As it was last asked; empty where it cannot be.
+  projector::ControlRecord projector_record;
 };
 
 /// How a step went, for people and for the report.
@@ -126,6 +128,8 @@ struct Step {
 };
 
 // The steps, in their order; each is in a file of its own in steps/.
+/// Needs Devices::control; left out where there is none.
+[[nodiscard]] Result<Answer> look_at_projector(StepContext& context);
 [[nodiscard]] Result<Answer> check_picture(StepContext& context);
 [[nodiscard]] Result<Answer> warm_up(StepContext& context);
 [[nodiscard]] Result<Answer> look_at_room(StepContext& context);

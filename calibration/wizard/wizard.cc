@@ -8,6 +8,11 @@ namespace veneer::calibration {
 namespace {
 
 constexpr std::array kSteps{
+    Step{"projector",
+         "Projector",
+         "Asks the projector how it is set, so that the profile says so and a change can be told "
+         "later.",
+         &look_at_projector},
     Step{"picture",
          "Picture",
          "Shows black, white and greys to see whether they reach the instrument and whether "
@@ -155,9 +160,11 @@ Result<WizardOutcome> run_wizard(const WizardOptions& options,
     const Step& current = kSteps[step];
     const std::string name(current.name);
     StepReport report{name, std::string(current.title), false, {}, {}};
-    if (options.skip.contains(name)) {
+    const bool nobody_to_ask = current.run == &look_at_projector && devices.control == nullptr;
+    if (nobody_to_ask || options.skip.contains(name)) {
       report.skipped = true;
-      report.summary = "left out, as asked";
+      report.summary = nobody_to_ask ? "left out: no control of the projector is configured"
+                                     : "left out, as asked";
       outcome.reports.push_back(std::move(report));
       ++step;
       continue;

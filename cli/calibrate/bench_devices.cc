@@ -73,6 +73,7 @@ Result<Answer> BenchDevices::Hands::please(const calibration::Request& request) 
     case Task::kAimAtObject:
     case Task::kCoverLens:
     case Task::kUncoverLens:
+    case Task::kSeeToProjector:
       break;
   }
   return answer;

@@ -6,6 +6,8 @@
 #include "base/toml_reader.h"
 #include "capture/cameras/cameras.h"
 #include "cli/calibrate/display_picker.h"
+#include "projector/control_watch.h"
+#include "projector/controls.h"
 #include "projector/outputs.h"
 #include "projector/outputs/window/window_output.h"
 #include "tracking/drivers.h"
@@ -43,12 +45,23 @@ Result<std::unique_ptr<RigDevices>> RigDevices::open(const std::filesystem::path
     table.require("position_m", landmark.in_object);
     options.landmarks.push_back(std::move(landmark));
   }
+  VENEER_TRY(rig->open_control(toml));
   VENEER_TRY(rig->open_output(toml));
   VENEER_TRY(rig->open_camera(toml));
-  VENEER_TRY(rig->open_instrument(toml));
   VENEER_TRY(rig->open_probes(toml, options));
+  // Last: it has the whole file checked, and what was not asked for yet would be unknown to it.
+  VENEER_TRY(rig->open_instrument(toml));
   VENEER_TRY(toml.finish());
   return rig;
+}
+
+Status RigDevices::open_control(TomlReader& toml) {
+  TomlReader table = toml.table("control");
+  if (!table.contains("driver")) return {};
+  VENEER_ASSIGN(control_, projector::open_control(table, clock_));
+  // The daemon's key, so that both can have the same table.
+  static_cast<void>(projector::ControlWatchOptions::read(table));
+  return {};
 }
 
 Status RigDevices::open_output(TomlReader& toml) {
@@ -141,6 +154,7 @@ calibration::Devices RigDevices::devices() {
   devices.hands = &hands_;
   devices.clock = &clock_;
   devices.camera = camera_.get();
+  devices.control = control_.get();
   devices.begin_step = [this] { aimed_->forget_aim(); };
   devices.board_sensor = board_sensor_ ? &*board_sensor_ : nullptr;
   devices.stylus = stylus_ ? &*stylus_ : nullptr;

@@ -14,6 +14,7 @@
 #include "calibration/wizard/tracked_probes.h"
 #include "calibration/wizard/wizard.h"
 #include "capture/camera.h"
+#include "projector/control.h"
 #include "projector/output.h"
 #include "tracking/tracker.h"
 
@@ -31,6 +32,8 @@ namespace veneer::cli {
 ///     [camera]                              # optional: finds the geometry; docs/howto/camera.md
 ///     driver = "aravis"
 ///     [tracker]                             # optional, as for veneerd
+///     [control]                             # optional: how the projector is set is kept with the
+///     driver = "pjlink"                     # profile; docs/howto/projector.md
 ///     [board]                               # the chequered board for the camera
 ///     columns = 9
 ///     rows = 7
@@ -59,6 +62,7 @@ class RigDevices {
   explicit RigDevices(calibration::Operator& hands) : hands_(hands) {}
   [[nodiscard]] Status open_output(TomlReader& toml);
   [[nodiscard]] Status open_camera(TomlReader& toml);
+  [[nodiscard]] Status open_control(TomlReader& toml);
   [[nodiscard]] Status open_instrument(TomlReader& toml);
   [[nodiscard]] Status open_probes(TomlReader& toml, calibration::WizardOptions& options);
 
@@ -71,7 +75,8 @@ class RigDevices {
   std::unique_ptr<projector::Output> output_;
   std::optional<calibration::OutputPatchDisplay> display_;
   std::optional<calibration::WatchedDisplay> watched_;
-  std::unique_ptr<capture::Camera> camera_;  // null: geometry comes from elsewhere
+  std::unique_ptr<projector::ProjectorControl> control_;  // null: the projector cannot be asked
+  std::unique_ptr<capture::Camera> camera_;               // null: geometry comes from elsewhere
   std::unique_ptr<calibration::Colorimeter> instrument_;
   std::optional<calibration::AimedColorimeter> aimed_;
   std::unique_ptr<tracking::Tracker> tracker_;

@@ -2,6 +2,9 @@
 #include <nlohmann/json.hpp>
 
 #include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "base/exit_code.h"
 #include "calibration/verification.h"
@@ -10,6 +13,7 @@
 #include "cli/calibrate/rig_devices.h"
 #include "cli/commands/commands.h"
 #include "cli/report/verification.h"
+#include "projector/control_watch.h"
 #include "simulation/bench/registration.h"
 
 namespace veneer::cli {
@@ -51,6 +55,20 @@ Result<Devices> open_devices(CommandLine& line, const PatchOptions& options) {
   return opened;
 }
 
+/// What became of the projector since the profile was measured, a line each.
+std::vector<std::string> warnings_of(const projector::ControlReport& report) {
+  std::vector<std::string> lines;
+  if (!report.reachable)
+    lines.push_back(fmt::format("the projector cannot be asked how it is set: {}", report.text));
+  for (const std::string& each : report.changes)
+    lines.push_back(fmt::format(
+        "the projector is not as it was when the profile was measured: {}; set it back, or "
+        "calibrate again",
+        each));
+  for (const std::string& each : report.warnings) lines.push_back("the projector: " + each);
+  return lines;
+}
+
 /// Holds a profile against readings of patches that it was not made from.
 Result<int> verify_patches(CommandLine& line, const PatchOptions& options) {
   constexpr std::uint64_t kSeed = 2;  // other patches than the wizard's own proof
@@ -71,6 +89,14 @@ Result<int> verify_patches(CommandLine& line, const PatchOptions& options) {
         devices.width,
         devices.height,
         devices.bits);
+  // Before all else: where figures are bad, this is why.
+  std::optional<projector::ControlReport> control;
+  std::vector<std::string> warnings;
+  if (devices.control != nullptr) {
+    control = projector::look_at(*devices.control, profile.record);
+    warnings = warnings_of(*control);
+    for (const std::string& each : warnings) devices.hands->say("Warning: " + each);
+  }
   VENEER_ASSIGN(
       const calibration::ProfileVerification result,
       calibration::verify_profile(
@@ -92,7 +118,15 @@ Result<int> verify_patches(CommandLine& line, const PatchOptions& options) {
                               {"good", verdict.good},
                               {"calibrate_again", verdict.calibrate_again},
                               {"verdict", verdict.sentence}};
-  std::string text = verdict.sentence;
+  std::string text;
+  if (control) {
+    json["projector"] = {{"reachable", control->reachable},
+                         {"state", control->text},
+                         {"changes", control->changes},
+                         {"warnings", control->warnings}};
+    for (const std::string& each : warnings) text += "Warning: " + each + "\n";
+  }
+  text += verdict.sentence;
   if (opened.bench) {
     // Only a bench knows where its pixels really land.
     VENEER_ASSIGN(const simulation::RegistrationError registration,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "base/testing/fuzzing.h"
 #include "calibration/instruments/colorhug/colorhug_protocol.h"
-#include "calibration/testing/fuzzing.h"
 
 namespace veneer::calibration {
 namespace {
@@ -24,8 +24,10 @@ std::string read(std::string_view text) {
 }
 
 }  // namespace
+}  // namespace veneer::calibration
 
-const FuzzedReader& fuzzed_reader() {
+const veneer::FuzzedReader& veneer::fuzzed_reader() {
+  using namespace calibration;
   using namespace std::string_literals;
   static const FuzzedReader kReader{&read,
                                     {"\0\x23\0\x80\x23\0\0\0\x28\0\0\x40\x10\0"s,
@@ -34,5 +36,3 @@ const FuzzedReader& fuzzed_reader() {
                                      "\x12\x23"s}};
   return kReader;
 }
-
-}  // namespace veneer::calibration

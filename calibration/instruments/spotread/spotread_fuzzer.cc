@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/testing/fuzzing.h"
 #include "calibration/instruments/spotread/spotread_output.h"
-#include "calibration/testing/fuzzing.h"
 
 namespace veneer::calibration {
 namespace {
@@ -31,8 +31,10 @@ std::string read(std::string_view text) {
 }
 
 }  // namespace
+}  // namespace veneer::calibration
 
-const FuzzedReader& fuzzed_reader() {
+const veneer::FuzzedReader& veneer::fuzzed_reader() {
+  using namespace calibration;
   static const FuzzedReader kReader{
       &read,
       {"\x10\nPlace cap on the instrument, or place on a dark surface,\n and then hit any key to "
@@ -43,5 +45,3 @@ const FuzzedReader& fuzzed_reader() {
        "\xFFspotread: Error - No instrument at port 1\nany other key to use reading:"}};
   return kReader;
 }
-
-}  // namespace veneer::calibration

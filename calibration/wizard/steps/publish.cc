@@ -8,6 +8,7 @@
 #include "calibration/profile_files.h"
 #include "calibration/profile_store.h"
 #include "calibration/wizard/report.h"
+#include "calibration/wizard/steps/internal_projector.h"
 
 namespace veneer::calibration {
 namespace {
@@ -31,6 +32,7 @@ std::map<std::string, std::string> record_of(const StepContext& context, const s
     record["geometry"] = fmt::format("{} board poses, held out {:.3f} px rms",
                                      results.views.size(),
                                      results.geometry->held_out_projector_rms_px);
+  record.insert(results.projector_record.begin(), results.projector_record.end());
   record["colour"] = results.measured->choice;
   if (results.verification) {
     const ProfileVerification& v = *results.verification;
@@ -40,13 +42,15 @@ std::map<std::string, std::string> record_of(const StepContext& context, const s
                                      v.de00_max,
                                      v.patches.size());
   }
-  for (const StepReport& step : context.reports) {
+  const auto warn = [&record](const StepReport& step) {
     for (const Finding& finding : step.findings) {
       if (finding.severity == Finding::Severity::kNote) continue;
       std::string& text = record["warnings"];
       text += (text.empty() ? "" : "\n") + finding.what;
     }
-  }
+  };
+  for (const StepReport& step : context.reports) warn(step);
+  warn(context.report);  // what publishing itself found
   return record;
 }
 
@@ -56,6 +60,7 @@ Result<Answer> publish(StepContext& context) {
   WizardResults& results = context.results;
   if (!results.measured)
     return fail(Errc::kInvalidOption, "there is nothing to write; do the step light");
+  VENEER_TRY(look_at_projector_again(context));
   const std::string made = utc_now();
   results.measured->profile.record = record_of(context, made);
   const ProjectorProfile& profile = results.measured->profile;
