@@ -9,10 +9,12 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <thread>
 #include <utility>
 #include <vector>
 
 #include "projector/control/dlpc350/dlpc350.h"
+#include "projector/control_watch.h"
 #include "projector/controls.h"
 #include "tracking/testing/mock_hidraw.h"
 
@@ -346,6 +348,46 @@ TEST_F(Dlpc350Bus, OneThatFailsInTheMiddleIsDisconnected) {
   ASSERT_TRUE(engine);
   fault(0x1A0C, Fault::kUnplug);
   EXPECT_EQ(engine->read_state().error().code, Errc::kDisconnected);
+}
+
+TEST_F(Dlpc350Bus, OneThatIsInterruptedSaysNoMore) {
+  device_.plug();
+  const auto engine = open();
+  ASSERT_TRUE(engine);
+  engine->interrupt();
+  EXPECT_EQ(engine->read_state().error().code, Errc::kCancelled);
+  EXPECT_EQ(engine->freeze(true).error().code, Errc::kCancelled);
+  EXPECT_TRUE(take_received().empty());
+}
+
+TEST_F(Dlpc350Bus, AWatchSeesItsLedsTurnedAndItPulledOutAndPutInAgain) {
+  device_.plug();
+  const auto before = open()->read_state();
+  ASSERT_TRUE(before) << before.error().what;
+  const ControlWatch watch(
+      [this]() -> Result<std::unique_ptr<ProjectorControl>> {
+        return Dlpc350::open(options_, clock_);
+      },
+      to_record(*before),
+      {.period = 20ms, .first_pause = 20ms, .longest_pause = 20ms});
+  const auto wait_for = [&](const std::function<bool(const ControlReport&)>& is_it) {
+    for (int i = 0; i < 1000 && !is_it(watch.report()); ++i) std::this_thread::sleep_for(10ms);
+    return watch.report();
+  };
+  const ControlReport well = wait_for([](const auto& r) { return r.reachable; });
+  ASSERT_TRUE(well.reachable) << well.text;
+  EXPECT_TRUE(well.changes.empty());
+  set(0x0B01, {155, 135, 164});  // one step of the blue LED
+  const ControlReport turned = wait_for([](const auto& r) { return !r.changes.empty(); });
+  ASSERT_EQ(turned.changes.size(), 1U);
+  EXPECT_THAT(turned.changes.front(), HasSubstr("LED"));
+  device_.unplug();
+  EXPECT_FALSE(wait_for([](const auto& r) { return !r.reachable; }).reachable);
+  set(0x0B01, {155, 135, 165});
+  device_.plug();
+  const ControlReport back = wait_for([](const auto& r) { return r.reachable; });
+  EXPECT_TRUE(back.reachable) << back.text;
+  EXPECT_TRUE(back.changes.empty());
 }
 
 TEST_F(Dlpc350Bus, TheRegistryOpensIt) {
