@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+// The daemon, left alone with everything that can go wrong. How long: VENEER_SOAK_MINUTES of
+// virtual time, VENEER_SOAK_REAL_MINUTES of real time; ./dev soak runs an hour of the first.
+#include "tests/soak/soak.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "render/renderer.h"
+
+namespace veneer::soak {
+namespace {
+
+constexpr double kCeiling_nits = 250;
+
+double minutes_of(const char* variable, double otherwise) {
+  const char* given = std::getenv(variable);
+  return given != nullptr ? std::strtod(given, nullptr) : otherwise;
+}
+
+/// Why nothing can be drawn here; empty where it can.
+std::string no_gl() {
+  const auto stage = Stage::create({});
+  if (!stage) return stage.error().what;
+  const auto scene = render::Scene::load((*stage)->scene());
+  const auto material = btf::load_material((*stage)->material());
+  if (!scene || !material) return "the stage's own files cannot be read";
+  const auto renderer = render::Renderer::create(*scene, **material, (*stage)->good_profile(), {});
+  return renderer ? std::string{} : renderer.error().what;
+}
+
+/// The brightest of the first frames with this ceiling, by the meter.
+double brightest_with(double ceiling_nits) {
+  Stage::Options options;
+  options.frames = 10;
+  options.ceiling_nits = ceiling_nits;
+  const auto stage = Stage::create(options).value();
+  Switches switches;
+  Display display(LightMeter(stage->good_profile()), HUGE_VAL);
+  DrawLaws laws;
+  std::atomic<Clock*> clock{nullptr};
+  const auto daemon =
+      daemon::Daemon::create(
+          stage->config(),
+          {},
+          faulty_devices(stage->config(), options.frame_rate_hz, switches, display, laws, clock))
+          .value();
+  const std::atomic<bool> stop{false};
+  SilentProgress silent;
+  const auto summary = daemon->run(stop, silent);
+  EXPECT_TRUE(summary) << summary.error().what;
+  EXPECT_EQ(display.picture().frames, options.frames);
+  return display.picture().brightest_nits;
+}
+
+/// The least of what was held in a part of the run, given by shares of it.
+Holdings least(const std::vector<Holdings>& all, double from, double to) {
+  const auto count = static_cast<double>(all.size());
+  const auto first = static_cast<std::size_t>(count * from);
+  const auto last = std::max(first + 1, static_cast<std::size_t>(count * to));
+  Holdings least = all.at(first);
+  for (std::size_t i = first; i < std::min(last, all.size()); ++i) {
+    least.heap_bytes = std::min(least.heap_bytes, all[i].heap_bytes);
+    least.resident_bytes = std::min(least.resident_bytes, all[i].resident_bytes);
+    least.descriptors = std::min(least.descriptors, all[i].descriptors);
+    least.threads = std::min(least.threads, all[i].threads);
+    least.gl_objects = std::min(least.gl_objects, all[i].gl_objects);
+  }
+  return least;
+}
+
+void expect_flat(const SoakResult& result) {
+  ASSERT_GE(result.holdings.size(), 8U);
+  const Holdings early = least(result.holdings, 0.25, 0.5);
+  const Holdings late = least(result.holdings, 0.75, 1.0);
+  // A descriptor or an object lost by one injection in ten would be dozens by then.
+  EXPECT_LE(late.descriptors, early.descriptors) << text_of(late);
+  EXPECT_LE(late.threads, early.threads) << text_of(late);
+  EXPECT_LE(late.gl_objects, early.gl_objects) << text_of(late);
+  // What the injections between the two may keep, each.
+  constexpr std::int64_t kBytesAnInjection = 1000;
+  const auto allowed = kBytesAnInjection * static_cast<std::int64_t>(result.injected / 2);
+  EXPECT_LE(late.heap_bytes - early.heap_bytes, allowed) << text_of(early) << "\n" << text_of(late);
+  // The frames that a run remembers are touched one by one.
+  const auto remembered =
+      static_cast<std::int64_t>(daemon::kRememberedFrames * sizeof(daemon::FrameRecord));
+  EXPECT_LE(late.resident_bytes - early.resident_bytes, allowed + remembered + (4 << 20))
+      << text_of(early) << "\n"
+      << text_of(late);
+}
+
+void expect_endured(const SoakResult& result) {
+  fmt::print("{}", text_of(result));
+  for (const std::string& violation : result.violations) ADD_FAILURE() << violation;
+  EXPECT_EQ(result.violation_count, 0U);
+  EXPECT_EQ(result.picture.too_bright, 0U) << result.picture.first_too_bright;
+  EXPECT_GT(result.picture.brightest_nits, 0.5 * kCeiling_nits) << "the ceiling was never near";
+  for (const InjectionKind& kind : injection_kinds()) {
+    const Tally& tally = result.tallies[static_cast<std::size_t>(kind.injection)];
+    EXPECT_EQ(tally.recovered, tally.injected) << kind.name;
+    EXPECT_TRUE(tally.met > 0 || tally.injected <= 3) << kind.name << " never had an effect";
+  }
+  expect_flat(result);
+}
+
+TEST(Soak, TheCeilingIsNeeded) {
+  if (const std::string why = no_gl(); !why.empty()) GTEST_SKIP() << why;
+  EXPECT_GT(brightest_with(0), 1.5 * kCeiling_nits);
+  EXPECT_LE(brightest_with(kCeiling_nits), kCeiling_nits * (1 + 1e-5));
+}
+
+TEST(Soak, EnduresVirtualTime) {
+  if (const std::string why = no_gl(); !why.empty()) GTEST_SKIP() << why;
+  SoakOptions options;
+  options.ceiling_nits = kCeiling_nits;
+  options.seconds = 60 * minutes_of("VENEER_SOAK_MINUTES", 10);
+  const auto soak = Soak::create(options);
+  ASSERT_TRUE(soak) << soak.error().what;
+  const auto result = (*soak)->run();
+  ASSERT_TRUE(result) << result.error().what;
+  expect_endured(*result);
+  EXPECT_GE(result->kinds, 15);
+  // At the rate that gives a thousand in an hour.
+  EXPECT_GE(static_cast<double>(result->injected), options.seconds / 3.6);
+}
+
+TEST(Soak, EnduresRealTime) {
+  if (const std::string why = no_gl(); !why.empty()) GTEST_SKIP() << why;
+  SoakOptions options;
+  options.virtual_time = false;
+  options.ceiling_nits = kCeiling_nits;
+  options.seconds = 60 * minutes_of("VENEER_SOAK_REAL_MINUTES", 2);
+  options.pause_s = 1;
+  const auto soak = Soak::create(options);
+  ASSERT_TRUE(soak) << soak.error().what;
+  const auto result = (*soak)->run();
+  ASSERT_TRUE(result) << result.error().what;
+  expect_endured(*result);
+}
+
+}  // namespace
+}  // namespace veneer::soak
