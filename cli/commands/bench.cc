@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/commands/bench_colour.h"
 #include "cli/commands/bench_fit.h"
+#include "cli/commands/bench_latency.h"
 #include "cli/commands/bench_query.h"
 #include "cli/commands/bench_render.h"
 #include "cli/commands/commands.h"
@@ -14,20 +15,23 @@ Result<int> run_bench(CommandLine& line) {
   std::string evaluation = "fragment";
   std::string model_name = "lpca";
   btf::FitOptions fit;
+  BenchLatencyOptions latency;
   CLI::App& app = line.app();
   app.add_option(
          "what",
          what,
          "render: what drawing a frame costs with each model; fit: what finding clusters in "
          "a basis gains; query: what asking for a pose costs; colour: how far each colour model is "
-         "from invented projectors")
+         "from invented projectors; latency: where the time from a pose to its light goes")
       ->required()
-      ->check(CLI::IsMember({"colour", "fit", "query", "render"}));
+      ->check(CLI::IsMember({"colour", "fit", "latency", "query", "render"}));
   app.add_option("set",
                  set,
                  "The sample set, NAME.btfset; render takes a small synthetic one by itself, and "
                  "compares what is drawn with a given one");
-  app.add_option("--size", render.size, "render: pixels, WIDTHxHEIGHT")->capture_default_str();
+  CLI::Option* size = app.add_option(
+      "--size", render.size, "render: pixels, WIDTHxHEIGHT; latency: likewise, 320x240 by itself");
+  size->capture_default_str();
   app.add_option("--frames", render.frames, "render: draws of each")->capture_default_str();
   app.add_option("--material",
                  render.materials,
@@ -58,6 +62,15 @@ Result<int> run_bench(CommandLine& line) {
   app.add_option("--components", fit.components, "fit: Eigen-BRDFs per texel")
       ->capture_default_str();
   app.add_option("--seed", fit.seed, "fit: seed of everything random")->capture_default_str();
+  app.add_option("--seconds", latency.seconds, "latency: how long veneerd runs")
+      ->capture_default_str()
+      ->check(CLI::Range(2.0, 3600.0));
+  app.add_option("--tracker-hz", latency.tracker_hz, "latency: poses a second")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 10000.0));
+  app.add_option("--frame-hz", latency.frame_hz, "latency: frames a second")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 1000.0));
   line.parse();
   if (what == "render") {
     render.set = set;
@@ -65,6 +78,10 @@ Result<int> run_bench(CommandLine& line) {
     return bench_render(render, line);
   }
   if (what == "colour") return bench_colour(line);
+  if (what == "latency") {
+    if (size->count() > 0) latency.size = render.size;
+    return bench_latency(latency, line);
+  }
   if (what == "query") return bench_query(line);
   if (set.empty()) return fail(Errc::kInvalidOption, "bench fit: name a sample set, NAME.btfset");
   VENEER_ASSIGN(const btf::Model* model, btf::find_model(model_name));

@@ -2,20 +2,14 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 #include <set>
 
-#include "base/colour.h"
 #include "base/exit_code.h"
 #include "base/files.h"
-#include "btf/material.h"
-#include "btf/sample_set.h"
-#include "calibration/profile.h"
 #include "cli/commands/commands.h"
 #include "cli/harness/harness_run.h"
+#include "cli/harness/stand_ins.h"
 #include "cli/programs.h"
-#include "simulation/materials/phong_texture.h"
 
 namespace veneer::cli {
 namespace {
@@ -31,44 +25,6 @@ struct HarnessOptions {
   std::vector<std::string> settings;
   int pictures_every = 10;
 };
-
-/// A glossy texture, whose highlight tells where the eye is taken to be.
-Status make_material(const fs::path& path, Progress& progress) {
-  if (is_up_to_date(path) && btf::load_material(path)) return {};
-  const fs::path set_path = path.parent_path() / "phong.btfset";
-  simulation::SynthesisOptions options;
-  options.size = 16;
-  VENEER_TRY(simulation::synthesize_phong(set_path, options, progress));
-  VENEER_ASSIGN(const btf::SampleSet set, btf::SampleSet::open(set_path));
-  VENEER_ASSIGN(const btf::Model* model, btf::find_model("phong"));
-  VENEER_ASSIGN(const auto material, model->fit(set, {}, progress));
-  return btf::save_material(*material, path, {});
-}
-
-/// A projector as a book has it, 1.2 m in front of the object.
-Status make_profile(const fs::path& path) {
-  calibration::ProjectorProfile profile;
-  calibration::ProjectorGeometry& geometry = profile.geometry;
-  geometry.width = 160;
-  geometry.height = 120;
-  geometry.fx = geometry.fy = 640;
-  geometry.cx = 80;
-  geometry.cy = 60;
-  // It stands at z = 1.2 and looks along -z; its x is the world's, its y points down.
-  geometry.world_from_projector.translation = {0, 0, 1.2};
-  geometry.world_from_projector.rotation =
-      Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitX());
-  for (std::vector<double>& curve : profile.tone_curves) {
-    for (int code = 0; code < 256; ++code) curve.push_back(std::pow(code / 255.0, 2.2));
-  }
-  constexpr double kWhite_nits = 800;
-  profile.primaries = kWhite_nits * xyz_from_srgb();
-  profile.black = Xyz(0.8, 0.8, 0.8);
-  profile.reference_distance_m = 1.2;
-  profile.vignetting = Image<float>(1, 1);
-  profile.vignetting(0, 0) = 1;
-  return profile.save(path);
-}
 
 std::string text_of(const Verdict& verdict) {
   const Expectation& e = verdict.expectation;
@@ -166,11 +122,11 @@ Result<int> run_harness(CommandLine& line) {
   if (error) return fail(Errc::kIo, "making {}: {}", options.out.string(), error.message());
   if (options.material.empty()) {
     options.material = options.out / "phong.safetensors";
-    VENEER_TRY(make_material(options.material, line.progress()));
+    VENEER_TRY(make_stand_in_material(options.material, line.progress()));
   }
   if (options.profile.empty()) {
     options.profile = options.out / "profile";
-    VENEER_TRY(make_profile(options.profile));
+    VENEER_TRY(make_stand_in_profile(options.profile, 160, 120));
   }
 
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
