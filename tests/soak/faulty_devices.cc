@@ -204,7 +204,8 @@ daemon::Devices faulty_devices(const std::filesystem::path& config,
         from_seconds(1 / frame_rate_hz), switches, display, clock);
   };
   devices.open_control =
-      [&switches](Clock& /*clock*/) -> Result<std::unique_ptr<projector::ProjectorControl>> {
+      [&switches, &laws](Clock& /*clock*/) -> Result<std::unique_ptr<projector::ProjectorControl>> {
+    laws.control_opened = true;
     return std::make_unique<FaultyControl>(switches);
   };
   devices.make_renderer = [&switches, &laws, &clock](
@@ -218,6 +219,9 @@ daemon::Devices faulty_devices(const std::filesystem::path& config,
     VENEER_ASSIGN(auto inner, render::Renderer::create(scene, material, profile, options, scanout));
     ++laws.renderers;
     return std::make_unique<FaultyRenderer>(std::move(inner), switches, laws, clock);
+  };
+  devices.memory_pressure = [&switches]() -> Result<double> {
+    return switches.met(Injection::kMemoryShort) ? 0.5 : 0.0;
   };
   return devices;
 }

@@ -19,6 +19,7 @@ struct DrawLaws {
   /// The share of the highlights in the last frame.
   std::atomic<double> specular_weight{0};
   std::atomic<std::uint64_t> renderers{0};  ///< made
+  std::atomic<bool> control_opened{false};  ///< somebody watches the projector
 };
 
 /// The devices of a rehearsal: the simulated tracker that the configuration describes, the real

@@ -113,6 +113,7 @@ constexpr std::array<InjectionKind, kInjectionCount> kKinds{{
     {Injection::kLightStorm, "storm of lights", Group::kCalls, kNothing, 0.1, 1, 2},
     {Injection::kBlankStorm, "storm of blanks", Group::kCalls, kNothing, 0.1, 1, 2},
     {Injection::kConcurrentCalls, "calls at once", Group::kCalls, kNothing, 0.1, 0.5, 1},
+    {Injection::kMemoryShort, "memory short", Group::kMachine, FaultKind::kMemory, 3, 6, 1},
     {Injection::kClockJump,
      "clock jumps seconds",
      Group::kMachine,

@@ -57,6 +57,7 @@ enum class Injection {
   kBlankStorm,
   kConcurrentCalls,
   // The machine.
+  kMemoryShort,
   kClockJump,
   kSuspended,
   kStopped,

@@ -184,10 +184,20 @@ void Soak::tick() {
 
 const InjectionKind* Soak::choose() {
   double sum = 0;
-  const auto possible = [this](const InjectionKind& kind) {
+  const auto busy = [this](Group group) {
+    return active_[static_cast<std::size_t>(group)].has_value();
+  };
+  const auto possible = [&](const InjectionKind& kind) {
     if (kind.when == When::kRealTime && options_.virtual_time) return false;
     if (kind.when == When::kVirtualTime && !options_.virtual_time) return false;
-    return !active_[static_cast<std::size_t>(kind.group)].has_value();
+    if (kind.group == Group::kProjector && !laws_.control_opened) return false;
+    // What needs a new renderer is rightly refused while none can be made.
+    const bool needs_renderer = kind.group == Group::kFiles || kind.group == Group::kCalls;
+    if (needs_renderer && switches_.is_on(Injection::kGpuRefusesToOpen)) return false;
+    if (kind.injection == Injection::kGpuRefusesToOpen &&
+        (busy(Group::kFiles) || busy(Group::kCalls)))
+      return false;
+    return !busy(kind.group);
   };
   for (const InjectionKind& kind : injection_kinds()) sum += possible(kind) ? kind.weight : 0;
   double left = sum * random_.uniform();
