@@ -248,7 +248,8 @@ void Soak::end(Active& active) {
     if (const auto written = daemon_->snapshot(); !written)
       violate(fmt::format("no snapshot on a good disk: {}", written.error().what));
   }
-  if (injection == Injection::kLightStorm || injection == Injection::kMaterialStorm) {
+  if ((injection == Injection::kLightStorm || injection == Injection::kMaterialStorm) &&
+      !active_[static_cast<std::size_t>(Group::kFiles)]) {
     if (const Status status = daemon_->set_scene(stage_->scene()); !status)
       violate(fmt::format("the scene was refused: {}", status.error().what));
     reload(true);
@@ -267,11 +268,12 @@ void Soak::look_for_recovery(Active& active, const ServiceStatus& status) {
   const InjectionKind& kind = *active.kind;
   const Duration took = now() - *active.ended;
   // While another thing keeps the display dark, no frame can be waited for.
-  const bool output_busy = active_[static_cast<std::size_t>(Group::kOutput)].has_value() ||
-                           active_[static_cast<std::size_t>(Group::kGpu)].has_value() ||
-                           switches_.is_on(Injection::kBlankStorm);
-  const bool own = kind.group == Group::kOutput || kind.group == Group::kGpu;
-  const bool frames = (output_busy && !own) || display_.picture().frames > active.frames_at_end;
+  const auto busy = [&](Group group) {
+    return group != kind.group && active_[static_cast<std::size_t>(group)].has_value();
+  };
+  const bool dark_otherwise =
+      busy(Group::kOutput) || busy(Group::kGpu) || switches_.is_on(Injection::kBlankStorm);
+  const bool frames = dark_otherwise || display_.picture().frames > active.frames_at_end;
   const bool over = !kind.fault || !lists(status, *kind.fault);
   Tally& tally = result_.tallies[static_cast<std::size_t>(kind.injection)];
   if (frames && over) {

@@ -114,7 +114,7 @@ TEST(Soak, EnduresVirtualTime) {
   if (const std::string why = no_gl(); !why.empty()) GTEST_SKIP() << why;
   SoakOptions options;
   options.ceiling_nits = kCeiling_nits;
-  options.seconds = 60 * minutes_of("VENEER_SOAK_MINUTES", 10);
+  options.seconds = 60 * minutes_of("VENEER_SOAK_MINUTES", 5);
   const auto soak = Soak::create(options);
   ASSERT_TRUE(soak) << soak.error().what;
   const auto result = (*soak)->run();
