@@ -97,10 +97,8 @@ Result<Config> Config::read(TomlReader& toml) {
     pacing.add_error("latch", "expected \"late\" or \"early\"");
   }
   read_service(toml.table("service"), config.service);
-  config.has_control = toml.contains("control");
   TomlReader control = toml.table("control");
-  control.read("poll_s", config.control_poll_s);
-  check_range(control, "poll_s", config.control_poll_s, 1, 3600);
+  config.control = projector::ControlWatchOptions::read(control);
   control.ignore_the_rest();
   toml.table("tracker").ignore_the_rest();
   toml.table("output").ignore_the_rest();

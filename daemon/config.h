@@ -7,6 +7,7 @@
 
 #include "base/result.h"
 #include "base/toml_reader.h"
+#include "projector/control_watch.h"
 #include "render/renderer.h"
 #include "service/front.h"
 #include "tracking/pose_track.h"
@@ -46,8 +47,7 @@ struct Config {
   /// STATE_DIRECTORY, which systemd sets. None where empty.
   std::filesystem::path state_directory;
   Latch latch = Latch::kLate;
-  bool has_control = false;    ///< there is a table [control]
-  double control_poll_s = 30;  ///< how often the projector is asked how it is. 1 to 3600
+  projector::ControlWatchOptions control;  ///< of the table [control], without its driver's keys
   service::FrontOptions service;
   render::RendererOptions render;
   tracking::PredictionOptions prediction;

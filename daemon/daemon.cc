@@ -15,6 +15,7 @@
 #include "daemon/housekeeper.h"
 #include "daemon/memory_pressure.h"
 #include "daemon/output_keeper.h"
+#include "daemon/projector_care.h"
 #include "daemon/recording_tracker.h"
 #include "daemon/reloader.h"
 #include "daemon/show_loader.h"
@@ -78,6 +79,7 @@ class TheDaemon final : public Daemon {
     const render::RasterFormat raster;  // stays: who wants another one starts anew
     PoseFeed poses;
     OutputKeeper output;
+    std::optional<ProjectorCare> projector;  // before the loader, whose thread looks after it
     ShowLoader loader;
     Reloader reloader;
   };
@@ -141,9 +143,19 @@ Result<Summary> TheDaemon::run(const std::atomic<bool>& stop, Progress& progress
   Stage& stage = *stage_;
   stage.loader.set_scanout(stage.output.get()->scanout());
   stage.reloader.made_of(*script);
+  // On a virtual clock nobody but the frame loop moves time.
+  if (devices_.open_control && !is_virtual()) {
+    stage.projector.emplace([this] { return devices_.open_control(clock()); },
+                            script->profile.record,
+                            config_.profile,
+                            config_.control,
+                            faults_,
+                            clock());
+  }
   stage.loader.set_chore([this, &stage] {
     housekeeper_.look();
     stage.reloader.look();
+    if (stage.projector) stage.projector->look(stage.loader.profile_counts().reloads);
   });
   const auto& material = *script->material;
   spdlog::info(
@@ -219,6 +231,7 @@ service::ServiceStatus TheDaemon::status() const {
   status.luminance_ceiling = names.luminance_ceiling;
   status.renderer = stage->loader.renderer_description();
   status.output = stage->output.description();
+  if (stage->projector) status.projector = stage->projector->text();
   const tracking::TrackerStatus tracker = stage->poses.status();
   status.tracker = fmt::format("{}: {}{}{}",
                                stage->poses.description(),

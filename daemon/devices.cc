@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "projector/control_watch.h"
 #include "projector/controls.h"
 #include "projector/outputs.h"
 #include "tracking/drivers.h"
@@ -39,8 +40,7 @@ Devices completed(Devices devices, const TomlReader& toml) {
   if (!devices.open_control && toml.contains("control")) {
     devices.open_control = [toml](Clock& clock) {
       return open_from(toml, "control", [&clock](TomlReader& table) {
-        double poll_s = 0;  // the daemon's own key
-        table.read("poll_s", poll_s);
+        static_cast<void>(projector::ControlWatchOptions::read(table));  // the daemon's own key
         return projector::open_control(table, clock);
       });
     };

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/projector_care.h"
+
+#include <fmt/ranges.h>
+
+#include <utility>
+#include <vector>
+
+#include "calibration/profile_store.h"
+
+namespace veneer::daemon {
+
+using service::FaultKind;
+
+ProjectorCare::ProjectorCare(projector::ControlWatch::Open open,
+                             projector::ControlRecord kept,
+                             std::filesystem::path profile,
+                             const projector::ControlWatchOptions& options,
+                             Faults& faults,
+                             Clock& clock)
+    : profile_(std::move(profile)),
+      faults_(faults),
+      clock_(clock),
+      watch_(std::move(open), std::move(kept), options) {}
+
+void ProjectorCare::look(std::uint64_t profiles) {
+  if (std::exchange(profiles_, profiles) != profiles) {
+    // One that cannot be read any more was reported by who drew with it.
+    if (const auto loaded = calibration::ProfileStore(profile_).load_newest_good())
+      watch_.keep(loaded->profile.record);
+  }
+  const projector::ControlReport report = watch_.report();
+  if (!report.asked) return;
+  const Time now = clock_.now();
+  if (!report.reachable) {
+    faults_.begin(FaultKind::kProjector, now, report.text);
+    return;  // what it said last still holds, for all that is known
+  }
+  faults_.end(FaultKind::kProjector, now);
+  std::vector<std::string> wrong = report.changes;
+  wrong.insert(wrong.end(), report.warnings.begin(), report.warnings.end());
+  if (wrong.empty()) {
+    faults_.end(FaultKind::kProjectorState, now);
+  } else {
+    faults_.begin(FaultKind::kProjectorState,
+                  now,
+                  fmt::format("since the profile was measured: {}; set it back, or calibrate again",
+                              fmt::join(wrong, "; ")));
+  }
+}
+
+}  // namespace veneer::daemon

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "base/clock.h"
+#include "daemon/faults.h"
+#include "projector/control_watch.h"
+
+namespace veneer::daemon {
+
+/// Watches the projector's own state beside the picture, and makes faults of it: kProjector while
+/// it does not answer, kProjectorState while it is not as it was when the profile was measured or
+/// says of itself what spoils colours.
+class ProjectorCare {
+ public:
+  /// @param profile  the folder whose record it is compared with.
+  /// Borrows the faults and the clock.
+  ProjectorCare(projector::ControlWatch::Open open,
+                projector::ControlRecord kept,
+                std::filesystem::path profile,
+                const projector::ControlWatchOptions& options,
+                Faults& faults,
+                Clock& clock);
+
+  /// Does what is due. One thread, which may wait for the disk.
+  /// @param profiles  how many profiles were exchanged so far; with another one the record is read
+  ///                  again.
+  void look(std::uint64_t profiles);
+  /// A line on the projector. Any thread.
+  [[nodiscard]] std::string text() const { return watch_.report().text; }
+
+ private:
+  const std::filesystem::path profile_;
+  Faults& faults_;
+  Clock& clock_;
+  std::uint64_t profiles_ = 0;
+  projector::ControlWatch watch_;
+};
+
+}  // namespace veneer::daemon
