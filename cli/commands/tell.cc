@@ -3,7 +3,7 @@
 
 #include <charconv>
 #include <filesystem>
-#include <optional>
+#include <functional>
 #include <string>
 #include <utility>
 
@@ -59,7 +59,7 @@ Result<service::Command> light_of(const TellOptions& options) {
 
 Result<int> run_tell(CommandLine& line) {
   TellOptions options;
-  std::optional<Result<service::Command>> command;
+  std::function<Result<service::Command>()> command;
   CLI::App& app = line.app();
   app.require_subcommand(1);
   app.add_option("--bus", options.bus, "system, session or an address such as unix:path=/run/bus")
@@ -67,7 +67,7 @@ Result<int> run_tell(CommandLine& line) {
   const auto add = [&](const char* name, const char* summary, auto make) {
     CLI::App* const added = app.add_subcommand(name, summary)->fallthrough();
     // CLI11 calls it once all is read.
-    added->callback([&command, make] { command = Result<service::Command>(make()); });
+    added->callback([&command, make] { command = make; });
     return added;
   };
   add("blank", "Go dark until unblank", [] { return service::Blank{true}; });
@@ -91,7 +91,7 @@ Result<int> run_tell(CommandLine& line) {
   light->add_option("--colour", options.colour, "Linear sRGB, multiplies: R,G,B")
       ->capture_default_str();
   line.parse();
-  VENEER_ASSIGN(const service::Command what, std::move(*command));
+  VENEER_ASSIGN(const service::Command what, command());
   VENEER_ASSIGN(const service::BusAddress address, service::BusAddress::parse(options.bus));
   VENEER_ASSIGN(service::BusClient client, service::BusClient::connect(address));
   VENEER_ASSIGN(const std::string answer, client.tell(what));
