@@ -341,6 +341,33 @@ TEST_F(DaemonTest, ABadFileIsRefusedAndIsOverOnceItIsGood) {
   }
 }
 
+TEST_F(DaemonTest, GoodFilesAreTriedAgainUntilARendererCanBeMadeOfThem) {
+  const auto over =
+      static_cast<int>(to_seconds(service::recovery_time_of(FaultKind::kConfiguration)) * kRate);
+  run(202 + over, [&](int frame, service::ServiceControl& control) {
+    if (frame == 10) {
+      write_scene("50");
+      hand_.renderer_refuses = true;
+      EXPECT_EQ(control.reload().error().code, Errc::kUnavailable);
+    }
+    if (frame == 11 || frame == 200) {
+      const auto status = control.status();
+      ASSERT_EQ(status.faults.size(), 1U);
+      EXPECT_EQ(status.faults[0].kind, FaultKind::kConfiguration);
+      EXPECT_EQ(status.state, State::kDegraded);
+      EXPECT_FALSE(hand_.dark) << "the picture of before stays";
+      EXPECT_EQ(lux_, 300);
+    }
+    // No file changes, and nobody asks.
+    if (frame == 200) hand_.renderer_refuses = false;
+    if (frame == 201 + over) {
+      EXPECT_EQ(control.status().state, State::kRunning);
+      EXPECT_EQ(lux_, 50);
+    }
+  });
+  EXPECT_EQ(hand_.presented, static_cast<std::uint64_t>(202 + over)) << "no frame was lost";
+}
+
 TEST_F(DaemonTest, ASnapshotHasTheCodesOfTheFrame) {
   run(20, [&](int frame, service::ServiceControl& control) {
     if (frame != 10) return;

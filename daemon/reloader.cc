@@ -12,6 +12,8 @@ using service::FaultKind;
 namespace {
 
 constexpr Duration kLookInterval = std::chrono::seconds(1);
+/// A large material takes a second to read and a renderer one to make, while calls wait.
+constexpr Duration kAgain = std::chrono::seconds(3);
 
 }  // namespace
 
@@ -72,6 +74,7 @@ Status Reloader::reload() {
 }
 
 Status Reloader::read_all() {
+  again_.reset();
   // Before they are read, so that what comes meanwhile is noticed.
   refused_ = stamps_of(file_.path, loader_.current());
   const Result<Config> config = file_.read();
@@ -108,8 +111,10 @@ Status Reloader::read_all() {
   if (const Status fits = render::check_exchangeable(loader_.current().raster(), next.profile);
       !fits)
     return refuse(FaultKind::kProfile, fits.error());
-  if (const Status exchanged = loader_.exchange(next); !exchanged)
+  if (const Status exchanged = loader_.exchange(next); !exchanged) {
+    again_ = clock_.now() + kAgain;
     return refuse(FaultKind::kConfiguration, exchanged.error());
+  }
   made_of(next);
   return {};
 }
@@ -118,9 +123,9 @@ void Reloader::look() {
   const Time now = clock_.now();
   if (!refused_ || now < due_) return;
   due_ = now + kLookInterval;
-  bool changed = false;
-  for (const auto& [file, stamp] : *refused_) changed |= stamp_of(file) != stamp;
-  if (changed) (void)reload();
+  bool again = again_ && now >= *again_;
+  for (const auto& [file, stamp] : *refused_) again |= stamp_of(file) != stamp;
+  if (again) (void)reload();
 }
 
 }  // namespace veneer::daemon

@@ -23,7 +23,9 @@ struct ConfigFile {
 };
 
 /// Reads the files again that a show was made of. What is bad is refused, is a fault from then on,
-/// and is tried again whenever one of the files changes, until it is good. All of it runs on the
+/// and is tried again whenever one of the files changes, until it is good. Where the files are good
+/// and no renderer can be made of them just now, the same is a kConfiguration (the picture of
+/// before stays, so it is no kGpu), and is tried again every few seconds. All of it runs on the
 /// loader's thread.
 ///
 /// The scene, the material, the profile and the tables [render] and [presence] are taken from the
@@ -40,7 +42,8 @@ class Reloader {
   void overridden() { overridden_ = true; }
   /// Errors: why it was refused; what is shown stays.
   [[nodiscard]] Status reload();
-  /// Tries again what was refused, where a file has changed since; for every now and then.
+  /// Tries again what was refused, where a file has changed since or what failed was not a file's
+  /// fault; for every now and then.
   void look();
 
  private:
@@ -65,6 +68,7 @@ class Reloader {
   Stamps shown_;                   // of what is shown
   std::optional<Stamps> refused_;  // of what was refused last
   bool overridden_ = false;
+  std::optional<Time> again_;  // when good files are tried again
   Time due_;
 };
 
