@@ -28,6 +28,11 @@ constexpr double kMostMarginPart = 0.6;  // of a period
 constexpr double kMarginGrowth = 1.5;
 constexpr double kMarginDecay = 0.998;  // for each frame: to half in 6 s at 60 a second
 constexpr double kTimeRank = 0.95;
+/// So many frames are believed when they say that slow ones are over.
+constexpr std::size_t kRecent = 8;
+/// Of a period: what a margin may fill. More would have every second refresh left out for sure, to
+/// be safe from missing one now and then.
+constexpr double kMostLeadPart = 0.95;
 /// After this many refreshes without a frame it is no longer pacing but a start.
 constexpr double kPause_periods = 60;
 
@@ -112,7 +117,17 @@ Duration Pacer::lead() const {
   const auto rank = static_cast<std::ptrdiff_t>(kTimeRank * static_cast<double>(known - 1));
   std::nth_element(
       sorted.begin(), sorted.begin() + rank, sorted.begin() + static_cast<std::ptrdiff_t>(known));
-  return sorted[static_cast<std::size_t>(rank)] + margin_;
+  Duration time = sorted[static_cast<std::size_t>(rank)];
+  const Duration most = rounded(kMostLeadPart * count(refreshes_.period()));
+  // More than a period leaves refreshes out, and dozens of frames take long to forget at that rate:
+  // it is believed only while frames of late have needed it.
+  if (time > most) {
+    Duration longest{};
+    for (std::size_t i = 1; i <= std::min(known, kRecent); ++i)
+      longest = std::max(longest, times_[(time_count_ - i) % kRemembered]);
+    time = std::min(time, longest);
+  }
+  return time < most ? std::min(time + margin_, most) : time + margin_;
 }
 
 Pacer::Plan Pacer::plan(std::uint64_t number, Time now) {

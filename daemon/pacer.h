@@ -40,7 +40,8 @@ class RefreshClock {
 /// Decides when a frame reads its pose, so that it is ready for a refresh and no sooner than
 /// needed: the time that drawing takes (nearly the longest of the last frames) and a margin before
 /// the refresh. The margin grows at once when a frame misses its refresh and shrinks slowly while
-/// none does. Allocates nothing.
+/// none does, and never makes a frame of more than a period out of a shorter one. After frames that
+/// took longer than a period the full rate is back as soon as a few have not. Allocates nothing.
 class Pacer {
  public:
   /// @param period  from refresh to refresh. > 0 (checked).

@@ -232,6 +232,43 @@ TEST(Pacer, AFrameLongerThanAPeriodTakesEverySecondRefresh) {
   EXPECT_NEAR(static_cast<double>(result.skipped), 500, 25);
 }
 
+TEST(Pacer, AfterSlowFramesTheFullRateIsBackAfterAFew) {
+  Pacer pacer(kPeriod, true);
+  Display display;
+  Time now{1ms};
+  Time shown = Time::min();
+  std::uint64_t number = 0;
+  // Each from its pose to the display; returns how many refreshes were left out.
+  const auto draw = [&](int frames, Duration took) {
+    std::uint64_t skipped = 0;
+    for (int i = 0; i < frames; ++i, ++number) {
+      const Pacer::Plan plan = pacer.plan(number, now);
+      skipped += plan.skipped;
+      pacer.took(took);
+      while (display.truth() <= plan.wake + took || display.truth() <= shown) display.step();
+      shown = display.truth();
+      now = shown + 100us;
+      (void)pacer.shown(number, display.stamp());
+    }
+    return skipped;
+  };
+  (void)draw(200, 4ms);
+  (void)draw(20, 80ms);
+  // Eight frames that still take five refreshes each for granted.
+  EXPECT_LE(draw(10, 4ms), 50U);
+  EXPECT_EQ(draw(100, 4ms), 0U);
+}
+
+TEST(Pacer, NoMarginLeavesOutRefreshes) {
+  Pacer pacer(kPeriod, true);
+  Display display;
+  (void)simulate(pacer, display, 500, 11, 0.1, 5, 14);
+  // Every fifth frame takes 3 ms more, so that the margin is as large as it gets.
+  const Result result = simulate(pacer, display, 500, 11, 0.1, 5, 14);
+  EXPECT_LT(pacer.lead(), kPeriod);
+  EXPECT_LE(result.skipped, 25U);
+}
+
 TEST(Pacer, AfterAPauseThereIsNoBurst) {
   Pacer pacer(kPeriod, true);
   Display display;
