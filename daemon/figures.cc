@@ -110,9 +110,9 @@ FigureBoard::Figures FigureBoard::last_second(Time now) const {
   return figures;
 }
 
-double FigureBoard::late_part(Time now, Duration span) const {
+std::optional<double> FigureBoard::late_part(Time now, Duration span) const {
   const std::vector<FrameFigures> frames = after(now - span);
-  if (frames.empty()) return 0;
+  if (frames.empty()) return std::nullopt;
   double late = 0;
   for (const FrameFigures& frame : frames) late += frame.late ? 1 : 0;
   const auto dropped = static_cast<double>(frames.front().dropped - frames.back().dropped);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "base/clock.h"
@@ -46,7 +47,8 @@ class FigureBoard {
   /// Of the frames of the second before `now`.
   [[nodiscard]] Figures last_second(Time now) const;
   /// The part of the refreshes within `span` before `now` that had a late frame or none; 0 to 1.
-  [[nodiscard]] double late_part(Time now, Duration span) const;
+  /// Nothing where no frame was done in that time: one may be under way.
+  [[nodiscard]] std::optional<double> late_part(Time now, Duration span) const;
   /// Since the start.
   [[nodiscard]] std::uint64_t frames() const { return posted_; }
 

@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <optional>
 #include <utility>
 
 #include "base/files.h"
@@ -60,15 +61,16 @@ void Housekeeper::tell() {
 }
 
 void Housekeeper::watch_lateness(Time now) {
-  const double part = board_.late_part(now, kLateSpan);
-  if (part > kLateBegins && !faults_.has(FaultKind::kLate)) {
+  const std::optional<double> part = board_.late_part(now, kLateSpan);
+  if (!part) return;
+  if (*part > kLateBegins && !faults_.has(FaultKind::kLate)) {
     faults_.begin(FaultKind::kLate,
                   now,
                   fmt::format("{:.0f} % of the frames of the last {} s came late or not at all; "
                               "choose a smaller picture, a lower rate or a simpler material",
-                              100 * part,
+                              100 * *part,
                               kLateSpan / 1s));
-  } else if (part < kLateEnds) {
+  } else if (*part < kLateEnds) {
     faults_.end(FaultKind::kLate, now);
   }
 }
