@@ -5,6 +5,7 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -65,18 +66,53 @@ std::size_t end_of_string(std::string_view text, std::size_t begin) {
   return text.size();
 }
 
-/// Where a character beyond ASCII stands outside of strings and comments. TOML has none there, and
-/// toml++ 3.3 has undefined behaviour (is_non_ascii_horizontal_whitespace) for most of them.
-std::optional<std::size_t> find_foreign(std::string_view text) {
+/// Whether a table's header, which begins with its bracket, goes on as toml++ can take: with a
+/// name, or with what it refuses itself.
+bool goes_on_with_a_name(std::string_view header) {
+  const auto skip_blanks = [&] {
+    header.remove_prefix(std::min(header.find_first_not_of(" \t"), header.size()));
+  };
+  header.remove_prefix(1);
+  skip_blanks();
+  if (header.starts_with('[')) {
+    header.remove_prefix(1);
+    skip_blanks();
+  }
+  if (header.empty()) return true;
+  const auto c = static_cast<unsigned char>(header.front());
+  return c >= 0x80 || std::isalnum(c) != 0 ||
+         std::string_view("_-\"']").find(header.front()) != std::string_view::npos;
+}
+
+/// Where a text has what toml++ 3.3 takes to be impossible, so that its behaviour is undefined.
+struct Impossible {
+  std::size_t at;
+  const char* what;
+};
+/// A character beyond ASCII outside of strings and comments, where TOML has none (most of them are
+/// too much for is_non_ascii_horizontal_whitespace), or a header that begins with no name
+/// (parse_key).
+std::optional<Impossible> find_impossible(std::string_view text) {
   std::size_t i = text.starts_with("\xEF\xBB\xBF") ? 3 : 0;  // a byte order mark
+  int depth = 0;                                             // of brackets and braces
+  bool line_begins = true;
   while (i < text.size()) {
-    if (text[i] == '#') {
+    const char c = text[i];
+    if (c == '#') {
       i = std::min(text.find('\n', i), text.size());
-    } else if (text[i] == '"' || text[i] == '\'') {
+    } else if (c == '"' || c == '\'') {
       i = end_of_string(text, i);
-    } else if (static_cast<unsigned char>(text[i]) >= 0x80) {
-      return i;
+      line_begins = false;
+    } else if (static_cast<unsigned char>(c) >= 0x80) {
+      return Impossible{i,
+                        "a character that is not ASCII stands outside of quotes; put the key or "
+                        "value in quotes"};
+    } else if (c == '[' && line_begins && depth == 0 && !goes_on_with_a_name(text.substr(i))) {
+      return Impossible{i, "a table's name should follow the bracket, as in [render]"};
     } else {
+      if (c == '[' || c == '{') ++depth;
+      if ((c == ']' || c == '}') && depth > 0) --depth;
+      line_begins = c == '\n' || (line_begins && (c == ' ' || c == '\t'));
       ++i;
     }
   }
@@ -94,7 +130,8 @@ struct TomlReader::Node {
 struct TomlReader::Document {
   std::string origin;
   std::filesystem::path folder;
-  toml::table root;
+  // Shared by those that read it again: a copy of it would not know its lines.
+  std::shared_ptr<toml::table> root;
   std::vector<std::shared_ptr<Node>> nodes;
   std::vector<std::string> mistakes;
 };
@@ -126,9 +163,8 @@ Result<TomlReader> TomlReader::open(const std::filesystem::path& path,
   VENEER_ASSIGN(TomlReader reader, parse(text, path.string()));
   reader.document_->folder = path.parent_path();
   for (const std::string& line : overrides) {
-    if (find_foreign(line))
-      return fail(
-          Errc::kInvalidOption, "reading the setting '{}': put what is not ASCII in quotes", line);
+    if (const auto impossible = find_impossible(line))
+      return fail(Errc::kInvalidOption, "reading the setting '{}': {}", line, impossible->what);
     toml::parse_result parsed = toml::parse(line);
     if (!parsed) {
       return fail(
@@ -137,18 +173,18 @@ Result<TomlReader> TomlReader::open(const std::filesystem::path& path,
           line,
           std::string(parsed.error().description()));
     }
-    merge(reader.document_->root, std::move(parsed).table());
+    merge(*reader.document_->root, std::move(parsed).table());
   }
   return reader;
 }
 
 Result<TomlReader> TomlReader::parse(std::string_view text, std::string_view origin) {
-  if (const auto foreign = find_foreign(text))
+  if (const auto impossible = find_impossible(text))
     return fail(Errc::kInvalidOption,
-                "{}:{}: a character that is not ASCII stands outside of quotes; put the key or "
-                "value in quotes",
+                "{}:{}: {}",
                 origin,
-                1 + std::ranges::count(text.substr(0, *foreign), '\n'));
+                1 + std::ranges::count(text.substr(0, impossible->at), '\n'),
+                impossible->what);
   toml::parse_result parsed = toml::parse(text, origin);
   if (!parsed) {
     return fail(Errc::kInvalidOption,
@@ -159,8 +195,8 @@ Result<TomlReader> TomlReader::parse(std::string_view text, std::string_view ori
   }
   auto document = std::make_shared<Document>();
   document->origin = origin;
-  document->root = std::move(parsed).table();
-  auto node = std::make_shared<Node>(Node{&document->root, "", {}});
+  document->root = std::make_shared<toml::table>(std::move(parsed).table());
+  auto node = std::make_shared<Node>(Node{document->root.get(), "", {}});
   document->nodes.push_back(node);
   return TomlReader(std::move(document), std::move(node));
 }
@@ -170,7 +206,7 @@ TomlReader TomlReader::again() const {
   document->origin = document_->origin;
   document->folder = document_->folder;
   document->root = document_->root;
-  auto node = std::make_shared<Node>(Node{&document->root, "", {}});
+  auto node = std::make_shared<Node>(Node{document->root.get(), "", {}});
   document->nodes.push_back(node);
   return TomlReader(std::move(document), std::move(node));
 }

@@ -59,6 +59,32 @@ TEST(TomlReader, LettersBeyondAsciiStandInQuotesAndComments) {
   }
 }
 
+// Each once ran into what toml++ takes to be impossible.
+TEST(TomlReader, RefusesATableWithoutAName) {
+  for (const char* wrong : {"a = [\n [1]]\n[\x01b]\n",
+                            "a = [[1], # [\n  [2]]\n[!b]\n",
+                            "a = 1\nb = ']'\n  [ =]\n",
+                            "# [\n'a]' = 1\n[[.b]]\n",
+                            "\n\n[\nb]\n",
+                            "\n\n[[ [b]]\n"}) {
+    const auto toml = TomlReader::parse(wrong, "t");
+    ASSERT_FALSE(toml) << wrong;
+    EXPECT_EQ(toml.error().code, Errc::kInvalidOption);
+    EXPECT_NE(toml.error().what.find("t:3: a table's name should follow"), std::string::npos)
+        << toml.error().what;
+  }
+  for (const char* wrong : {"[", "[[", "[]", "[[]]", "[ [a]]", "[a", "[a]]", "a = ["})
+    EXPECT_FALSE(TomlReader::parse(wrong, "t")) << wrong;
+}
+
+TEST(TomlReader, ReadsArraysWhoseLinesBeginWithBrackets) {
+  for (const char* good : {"a = [\n[+1],\n[-2], # [\n[\n]]\n[ b ]\nc = 1\n",
+                           "[ 'a' ]\n[[\"b\"]]\n[-c]\n[_d]\n[3]\n"}) {
+    const auto toml = TomlReader::parse(good, "t");
+    EXPECT_TRUE(toml) << good << toml.error().what;
+  }
+}
+
 TEST(TomlReader, NamesUnknownKeysWithLineAndNearestOne) {
   TomlReader toml =
       TomlReader::parse("frames = 1\n[light]\nilluminance = 3\n", "demo.toml").value();
