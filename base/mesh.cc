@@ -6,10 +6,15 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
+#include <fstream>
 #include <functional>
 #include <numbers>
+#include <string>
+#include <string_view>
 
 namespace veneer {
 namespace {
@@ -142,6 +147,33 @@ Status append(const aiMesh& part, const std::string& origin, Mesh& mesh) {
   return {};
 }
 
+/// A header of PLY that nothing ends is read for ever by assimp 5.2.5: there are two ways to get
+/// one, a transfer that was cut off and another letter.
+Status check_ply_header(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string magic(3, '\0');
+  file.read(magic.data(), 3);
+  std::ranges::transform(
+      magic, magic.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (!file || magic != "ply") return {};
+  constexpr std::size_t kMostHeader = 1U << 20U;
+  std::string header(kMostHeader, '\0');
+  file.read(header.data(), static_cast<std::streamsize>(header.size()));
+  std::string_view rest(header.data(), static_cast<std::size_t>(file.gcount()));
+  while (!rest.empty()) {
+    const std::size_t end = std::min(rest.find_first_of("\r\n"), rest.size());
+    std::string_view line = rest.substr(0, end);
+    line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
+    if (line.substr(0, line.find_first_of(" \t")) == "end_header") return {};
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+  }
+  return fail(
+      Errc::kBadFormat,
+      "reading the mesh {}: the header of this PLY file has no line end_header; it may have "
+      "been cut off: copy or export it again",
+      path);
+}
+
 }  // namespace
 
 Result<Mesh> load_mesh(const std::filesystem::path& path_or_name) {
@@ -159,7 +191,16 @@ Result<Mesh> load_mesh(const std::filesystem::path& path_or_name) {
   if (std::error_code error; !std::filesystem::is_regular_file(path_or_name, error))
     return fail(
         Errc::kBadFormat, "reading the mesh {}: it is a folder or a device; name a file", origin);
+  VENEER_TRY(check_ply_header(origin));
   Assimp::Importer importer;
+  // Without a name's end that it knows, assimp tries all of its readers, some fifty, on the
+  // contents.
+  if (const std::string kind = path_or_name.extension().string();
+      kind.empty() || !importer.IsExtensionSupported(kind))
+    return fail(Errc::kBadFormat,
+                "reading the mesh {}: its name does not end with a kind of mesh that is known; "
+                "export it as .obj, .ply or .gltf",
+                origin);
   // FlipUVs: files count v from the bottom of the texture, Veneer from its first row. SortByPType:
   // points and lines become parts of their own, which may lack texture coordinates and normals.
   const aiScene* scene = importer.ReadFile(

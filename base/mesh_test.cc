@@ -107,6 +107,40 @@ TEST(LoadMesh, DoesNotReadADeviceForEver) {
   }
 }
 
+// Each of these would keep assimp busy for ever.
+TEST(LoadMesh, RefusesAPlyFileWhoseHeaderDoesNotEnd) {
+  const TemporaryFolder folder;
+  const std::string begin = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n";
+  for (const char* name : {"a.ply", "ply"})
+    for (const char* rest : {"", "comment end_header\n", "end_headers\n0\n", "END_HEADER\n0\n"}) {
+      const auto path = folder.path() / name;
+      ASSERT_TRUE(write_text(path, begin + rest));
+      const auto mesh = load_mesh(path);
+      ASSERT_FALSE(mesh) << rest;
+      EXPECT_EQ(mesh.error().code, Errc::kBadFormat);
+      EXPECT_NE(mesh.error().what.find("end_header"), std::string::npos) << mesh.error().what;
+    }
+}
+
+TEST(LoadMesh, ReadsAPlyFileHoweverItsLinesEnd) {
+  const TemporaryFolder folder;
+  const std::string text =
+      "ply\nformat ascii 1.0\ncomment a\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float z\nproperty float s\nproperty float t\nelement face 1\n"
+      "property list uchar int vertex_indices\nend_header\n0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n"
+      "3 0 1 2\n";
+  std::string windows;
+  for (const char c : text) windows += c == '\n' ? std::string("\r\n") : std::string(1, c);
+  for (const std::string& file : {text, windows}) {
+    const auto path = folder.path() / "a.ply";
+    ASSERT_TRUE(write_text(path, file));
+    const auto mesh = load_mesh(path);
+    ASSERT_TRUE(mesh) << mesh.error().what;
+    EXPECT_EQ(mesh->triangles.size(), 1U);
+    EXPECT_EQ(mesh->positions.size(), 3U);
+  }
+}
+
 TEST(LoadMesh, RefusesMissingEmptyAndForeignFiles) {
   const TemporaryFolder folder;
   EXPECT_EQ(load_mesh("no-such-mesh.obj").error().code, Errc::kNotFound);
@@ -114,6 +148,11 @@ TEST(LoadMesh, RefusesMissingEmptyAndForeignFiles) {
   EXPECT_EQ(load_mesh(folder.path() / "empty.obj").error().code, Errc::kBadFormat);
   ASSERT_TRUE(write_text(folder.path() / "text.xyz", "hello"));
   EXPECT_EQ(load_mesh(folder.path() / "text.xyz").error().code, Errc::kBadFormat);
+  // What assimp could tell by its contents.
+  ASSERT_TRUE(write_text(folder.path() / "solid", "solid a\nendsolid a\n"));
+  const auto nameless = load_mesh(folder.path() / "solid");
+  EXPECT_EQ(nameless.error().code, Errc::kBadFormat);
+  EXPECT_NE(nameless.error().what.find("export it as"), std::string::npos) << nameless.error().what;
 }
 
 }  // namespace
