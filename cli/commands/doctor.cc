@@ -7,9 +7,11 @@
 #include "calibration/instruments/instruments.h"
 #include "capture/cameras/cameras.h"
 #include "cli/commands/commands.h"
+#include "cli/doctor/connector_text.h"
 #include "cli/ranks/ranks.h"
 #include "cli/service/status_text.h"
 #include "projector/control/dlpc350/dlpc350.h"
+#include "projector/outputs/kms/displays.h"
 #include "projector/outputs/window/displays.h"
 #include "render/egl_context.h"
 #include "service/bus/bus_client.h"
@@ -139,6 +141,29 @@ nlohmann::ordered_json look_at_displays(std::string& text) {
   return json;
 }
 
+struct Connectors {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  std::string problem;
+  std::string text;
+};
+
+/// The sockets of the display cards, where veneerd shows without a desktop; or why none can be
+/// told. A service that shows something there keeps its display.
+Connectors look_at_connectors() {
+  Connectors result;
+  const auto displays = projector::kms_displays();
+  if (!displays) {
+    result.problem = displays.error().what;
+    result.text = "\nconnector  " + result.problem;
+    return result;
+  }
+  for (const projector::KmsDisplay& each : *displays) {
+    result.json.push_back(json_of(each));
+    result.text += "\nconnector  " + text_of(each);
+  }
+  return result;
+}
+
 /// How the service is, or why it cannot be asked. It need not run: the tools do without.
 nlohmann::ordered_json look_at_service(std::string& text) {
   Result<service::BusClient> client = service::BusClient::connect({});
@@ -167,6 +192,7 @@ Result<int> run_doctor(CommandLine& line) {
   const nlohmann::ordered_json light_engines = look_at_light_engines(light_engines_text);
   std::string displays_text;
   const nlohmann::ordered_json displays = look_at_displays(displays_text);
+  const Connectors connectors = look_at_connectors();
   std::string service_text;
   const nlohmann::ordered_json service = look_at_service(service_text);
   line.print({{"gl", gl},
@@ -180,8 +206,10 @@ Result<int> run_doctor(CommandLine& line) {
               {"cameras_failed", cameras.failed},
               {"light_engines", light_engines},
               {"displays", displays},
+              {"connectors", connectors.json},
+              {"connectors_problem", connectors.problem},
               {"service", service}},
-             fmt::format("OpenGL   {}{}\nBLAS     {}\nMPI      {}\nthreads  {}{}{}{}{}{}{}",
+             fmt::format("OpenGL   {}{}\nBLAS     {}\nMPI      {}\nthreads  {}{}{}{}{}{}{}{}",
                          egl ? "" : "not usable: ",
                          gl,
                          blas,
@@ -192,6 +220,7 @@ Result<int> run_doctor(CommandLine& line) {
                          cameras.text,
                          light_engines_text,
                          displays_text,
+                         connectors.text,
                          service_text));
   return egl && trackers.all_usable ? kExitDone : kExitFailed;
 }
