@@ -2,7 +2,6 @@
 #include "daemon/profile_watcher.h"
 
 #include <spdlog/spdlog.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <memory>
@@ -32,16 +31,8 @@ struct ProfileWatcher::HandOver {
   double swap_ms = 0;
 };
 
-std::optional<ProfileWatcher::Identity> ProfileWatcher::identify(
-    const std::filesystem::path& folder) {
-  struct stat status {};
-  if (::stat((folder / "profile.json").c_str(), &status) != 0) return std::nullopt;
-  return Identity{
-      status.st_dev, status.st_ino, status.st_mtim.tv_sec, status.st_mtim.tv_nsec, status.st_size};
-}
-
 ProfileWatcher::ProfileWatcher(std::filesystem::path folder,
-                               const std::optional<Identity>& known,
+                               const std::optional<FileIdentity>& known,
                                const render::RasterFormat& raster,
                                const render::RendererOptions& options,
                                std::function<void(const Status&)> heard,
@@ -86,9 +77,9 @@ Status ProfileWatcher::check(std::chrono::milliseconds patience) {
 
 // Prepares what is in the folder and leaves it for the frame loop; false where the folder was
 // exchanged meanwhile, so that it must be read again.
-bool ProfileWatcher::read(const Identity& found) {
+bool ProfileWatcher::read(const FileIdentity& found) {
   auto profile = calibration::ProjectorProfile::load(folder_);
-  if (identify(folder_) != std::optional(found)) return false;
+  if (identify(folder_ / kProfileFile) != std::optional(found)) return false;
   if (!profile) {
     refuse(profile.error());
     return true;
@@ -121,7 +112,7 @@ void ProfileWatcher::dispose_of_used() {
   answer({});
 }
 
-void ProfileWatcher::watch(const std::stop_token& stop, std::optional<Identity> known) {
+void ProfileWatcher::watch(const std::stop_token& stop, std::optional<FileIdentity> known) {
   int missing = 0;
   SteadyClockPoint looked = std::chrono::steady_clock::now();
   while (!stop.stop_requested()) {
@@ -131,7 +122,7 @@ void ProfileWatcher::watch(const std::stop_token& stop, std::optional<Identity> 
     const SteadyClockPoint now = std::chrono::steady_clock::now();
     if (!asked && now - looked < interval_) continue;
     looked = now;
-    const std::optional<Identity> found = identify(folder_);
+    const std::optional<FileIdentity> found = identify(folder_ / kProfileFile);
     if (!found) {
       if (asked || ++missing == kMissingLooks) {
         missing = kMissingLooks;

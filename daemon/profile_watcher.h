@@ -10,9 +10,11 @@
 #include <mutex>
 #include <optional>
 #include <stop_token>
+#include <string_view>
 #include <thread>
 
 #include "base/result.h"
+#include "daemon/file_identity.h"
 #include "render/prepared_profile.h"
 #include "render/renderer.h"
 
@@ -37,25 +39,15 @@ struct ProfileCounts {
 /// folder without a profile.json is left alone: a profile that takes its place comes by rename.
 class ProfileWatcher {
  public:
-  /// Which profile.json stands in a folder: one that took its place is another file, one that was
-  /// written over has another time.
-  struct Identity {
-    std::uint64_t device = 0;
-    std::uint64_t file = 0;
-    std::int64_t seconds = 0;
-    std::int64_t nanoseconds = 0;
-    std::int64_t bytes = 0;
-    bool operator==(const Identity&) const = default;
-  };
-  /// None where there is no such file: between two renames, or for good.
-  [[nodiscard]] static std::optional<Identity> identify(const std::filesystem::path& folder);
+  /// The file of the folder by which a profile is known.
+  static constexpr std::string_view kProfileFile = "profile.json";
 
-  /// @param known  what stood in the folder before the renderer's profile was read from it.
+  /// @param known  which kProfileFile stood in the folder before the renderer's profile was read.
   /// @param raster, options  the renderer's.
   /// @param heard  called by the watching thread with what became of a profile, or with kNotFound
   ///               once where the folder has been without one for a while; may be empty.
   ProfileWatcher(std::filesystem::path folder,
-                 const std::optional<Identity>& known,
+                 const std::optional<FileIdentity>& known,
                  const render::RasterFormat& raster,
                  const render::RendererOptions& options,
                  std::function<void(const Status&)> heard,
@@ -76,8 +68,8 @@ class ProfileWatcher {
 
  private:
   struct HandOver;
-  void watch(const std::stop_token& stop, std::optional<Identity> known);
-  [[nodiscard]] bool read(const Identity& found);
+  void watch(const std::stop_token& stop, std::optional<FileIdentity> known);
+  [[nodiscard]] bool read(const FileIdentity& found);
   void dispose_of_used();
   void refuse(const Error& error);
   void answer(const Status& status);

@@ -59,7 +59,7 @@ class ProfileWatcherTest : public testing::Test {
   /// A watcher that looks all the time, or (`interval`) only when it is asked to.
   [[nodiscard]] ProfileWatcher watch(std::chrono::milliseconds interval = 2ms) {
     return {store_.folder(),
-            ProfileWatcher::identify(store_.folder()),
+            identify(store_.folder() / "profile.json"),
             {16, 12, 8},
             {},
             [this](const Status& status) { heard_.push_back(status.has_value()); },
@@ -104,7 +104,7 @@ TEST_F(ProfileWatcherTest, LeavesTheRendererAloneWhileNothingChanges) {
 }
 
 TEST_F(ProfileWatcherTest, SeesOneThatCameBeforeItBegan) {
-  const auto known = ProfileWatcher::identify(store_.folder());
+  const auto known = identify(store_.folder() / "profile.json");
   ASSERT_TRUE(store_.publish(profile_at(2)));
   ProfileWatcher watcher(store_.folder(), known, {16, 12, 8}, {}, {}, {2ms});
   EXPECT_TRUE(frames_until(watcher, [&] { return renderer_.distances == std::vector{2.0}; }));

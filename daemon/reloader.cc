@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/reloader.h"
 
-#include <sys/stat.h>
-
 #include <utility>
 
 namespace veneer::daemon {
@@ -30,13 +28,6 @@ Result<Config> ConfigFile::read(std::optional<TomlReader>* reader) const {
 Reloader::Reloader(ConfigFile file, ShowLoader& loader, Faults& faults, Clock& clock)
     : file_(std::move(file)), loader_(loader), faults_(faults), clock_(clock) {}
 
-std::optional<Reloader::Stamp> Reloader::stamp_of(const std::filesystem::path& file) {
-  struct stat status {};
-  if (::stat(file.c_str(), &status) != 0) return std::nullopt;
-  return Stamp{
-      status.st_dev, status.st_ino, status.st_mtim.tv_sec, status.st_mtim.tv_nsec, status.st_size};
-}
-
 // The profile has a watcher of its own; where it is refused, its folder is among them by then.
 Reloader::Stamps Reloader::stamps_of(const std::filesystem::path& config, const Script& script) {
   Stamps stamps;
@@ -45,7 +36,7 @@ Reloader::Stamps Reloader::stamps_of(const std::filesystem::path& config, const 
         script.config.scene,
         script.config.material,
         script.config.scene.parent_path() / script.scene.mesh_name}) {
-    stamps[file] = stamp_of(file);
+    stamps[file] = identify(file);
   }
   return stamps;
 }
@@ -82,7 +73,8 @@ Status Reloader::read_all() {
   Script named = loader_.current();
   named.config = *config;
   for (const auto& [file, stamp] : stamps_of(file_.path, named)) (*refused_)[file] = stamp;
-  (*refused_)[config->profile / "profile.json"] = stamp_of(config->profile / "profile.json");
+  (*refused_)[config->profile / ProfileWatcher::kProfileFile] =
+      identify(config->profile / ProfileWatcher::kProfileFile);
 
   const Config& now = loader_.current().config;
   const bool same_files =
@@ -124,7 +116,7 @@ void Reloader::look() {
   if (!refused_ || now < due_) return;
   due_ = now + kLookInterval;
   bool again = again_ && now >= *again_;
-  for (const auto& [file, stamp] : *refused_) again |= stamp_of(file) != stamp;
+  for (const auto& [file, stamp] : *refused_) again |= identify(file) != stamp;
   if (again) (void)reload();
 }
 

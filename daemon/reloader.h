@@ -9,6 +9,7 @@
 
 #include "base/result.h"
 #include "daemon/faults.h"
+#include "daemon/file_identity.h"
 #include "daemon/show_loader.h"
 
 namespace veneer::daemon {
@@ -47,17 +48,8 @@ class Reloader {
   void look();
 
  private:
-  struct Stamp {
-    std::uint64_t device = 0;
-    std::uint64_t file = 0;
-    std::int64_t seconds = 0;
-    std::int64_t nanoseconds = 0;
-    std::int64_t bytes = 0;
-    bool operator==(const Stamp&) const = default;
-  };
-  using Stamps = std::map<std::filesystem::path, std::optional<Stamp>>;
+  using Stamps = std::map<std::filesystem::path, std::optional<FileIdentity>>;
   [[nodiscard]] static Stamps stamps_of(const std::filesystem::path& config, const Script& script);
-  [[nodiscard]] static std::optional<Stamp> stamp_of(const std::filesystem::path& file);
   [[nodiscard]] Status read_all();
   [[nodiscard]] Status refuse(service::FaultKind kind, const Error& error);
 

@@ -24,7 +24,7 @@ Status read_material(Script& script) {
 
 Status read_profile(Script& script, std::string* warning) {
   // Before it is read, so that one that comes meanwhile is noticed.
-  const auto identity = ProfileWatcher::identify(script.config.profile);
+  const auto identity = identify(script.config.profile / ProfileWatcher::kProfileFile);
   VENEER_ASSIGN(calibration::ProfileStore::Loaded loaded,
                 calibration::ProfileStore(script.config.profile).load_newest_good());
   script.profile = std::move(loaded.profile);

@@ -15,6 +15,7 @@
 #include "calibration/profile.h"
 #include "daemon/config.h"
 #include "daemon/devices.h"
+#include "daemon/file_identity.h"
 #include "daemon/observers.h"
 #include "daemon/pose_feed.h"
 #include "daemon/profile_watcher.h"
@@ -34,7 +35,7 @@ struct Script {
   /// Shared by the scripts that have it in common: it may be as large as half the memory.
   std::shared_ptr<const btf::Material> material;
   calibration::ProjectorProfile profile;
-  std::optional<ProfileWatcher::Identity> profile_identity;  ///< before it was read
+  std::optional<FileIdentity> profile_identity;  ///< before it was read
 
   [[nodiscard]] render::RasterFormat raster() const {
     return {profile.geometry.width, profile.geometry.height, profile.bits};
