@@ -111,6 +111,13 @@ Status check_info(const SampleSetInfo& info, Errc code, std::string_view doing) 
   for (const auto& [name, directions] :
        {std::pair{"views", &info.views}, {"lights", &info.lights}}) {
     if (directions->empty()) return fail(code, "{}: there are no {}", doing, name);
+    if (directions->size() > kMostDirections)
+      return fail(code,
+                  "{}: there are {} {}, over {}; leave some out",
+                  doing,
+                  directions->size(),
+                  name,
+                  kMostDirections);
     for (std::size_t i = 0; i < directions->size(); ++i) {
       const Direction& d = (*directions)[i];
       // As far below the horizon as rounding takes a direction that lies on it.

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "base/files.h"
+#include "btf/internal_sample_set.h"
 #include "btf/internal_test_sets.h"
 
 namespace veneer::btf {
@@ -150,6 +151,17 @@ TEST(SampleSetWriter, RefusesWhatCannotBeASet) {
   refused([](SampleSetInfo& i) { i.width = 0; }, "0 x 2 texels");
   refused([](SampleSetInfo& i) { i.width = i.height = 1 << 20; }, "texels");
   refused([](SampleSetInfo& i) { i.views.clear(); }, "no views");
+  const auto on_an_arc = [](std::size_t count) {
+    DirectionSet directions;
+    for (std::size_t i = 0; i < count; ++i)
+      directions.push_back(direction_from_angles({1.5 * double(i) / double(count), 0}));
+    return directions;
+  };
+  refused([&](SampleSetInfo& i) { i.views = on_an_arc(internal::kMostDirections + 1); },
+          "5001 views, over 5000");
+  SampleSetInfo most = small_info();
+  most.views = on_an_arc(internal::kMostDirections);
+  EXPECT_TRUE(internal::check_info(most, Errc::kBadFormat, "trying"));
   refused([](SampleSetInfo& i) { i.lights.push_back(i.lights[1]); },
           "directions 1 and 3 are equal");
   refused([](SampleSetInfo& i) { i.lights[0] *= 2.0; }, "no unit vector");

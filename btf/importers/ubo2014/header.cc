@@ -6,11 +6,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "btf/internal_sample_set.h"
+
 namespace veneer::btf::ubo2014 {
 namespace {
 
-// More than any such device measures; equal directions are looked for in pairs.
-constexpr std::uint32_t kMostDirections = 5000;
+constexpr auto kMostDirections = static_cast<std::uint32_t>(internal::kMostDirections);
 
 struct Signature {
   std::string_view text;
