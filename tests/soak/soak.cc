@@ -16,13 +16,21 @@ using service::FaultKind;
 using service::ServiceStatus;
 
 constexpr std::size_t kMostTexts = 100;
-constexpr std::size_t kMeasurements = 20;
+/// A census is waited for until all is over, so that it costs injections.
+constexpr double kMostCensuses = 20;
+constexpr double kLeastCensuses = 10;
+/// After the last fault, until what it used is given back by all threads.
+constexpr Duration kCalm = 500ms;
+/// A machine that is busy for so long after a fault's cause has gone cannot show the fault's end.
+constexpr Duration kNeverCalm = 60s;
 /// Before the first injection: all is compiled, and every ring has gone round.
 constexpr Duration kWarmUp = 5s;
 /// The tracker may need this to be missed, the certainty to fade, and a frame to be drawn.
 constexpr Duration kHighlightsGone = 2s;
-/// From a state to what is seen: frames.
+/// From a state to what is seen: frames, or looks in real time; and where the frame loop has to
+/// wait for a processor.
 constexpr int kFewFrames = 5;
+constexpr int kManyFrames = 100;
 
 bool lists(const ServiceStatus& status, FaultKind kind) {
   return std::ranges::any_of(status.faults,
@@ -62,7 +70,8 @@ std::string text_of(const SoakResult& result) {
   text += fmt::format(
       "{} injections of {} kinds in {:.0f} s of the daemon's time, {:.0f} s of real time\n"
       "{} frames seen of {} drawn by {} renderers; the brightest pixel {:.2f} cd/m^2, {} frames "
-      "over the ceiling; without a new picture {:.1f} s\n",
+      "over the ceiling; without a new picture {:.1f} s; the machine was busy with other things "
+      "for {:.0f} s\n",
       result.injected,
       result.kinds,
       result.daemon_seconds,
@@ -72,7 +81,8 @@ std::string text_of(const SoakResult& result) {
       result.renderers,
       result.picture.brightest_nits,
       result.picture.too_bright,
-      result.dark_seconds);
+      result.dark_seconds,
+      result.busy_seconds);
   for (const Holdings& holdings : result.holdings) text += "  " + text_of(holdings) + "\n";
   return text;
 }
@@ -81,7 +91,9 @@ Soak::Soak(const SoakOptions& options, std::unique_ptr<Stage> stage)
     : options_(options),
       stage_(std::move(stage)),
       display_(LightMeter(stage_->good_profile()), options.ceiling_nits),
-      random_(options.seed) {}
+      random_(options.seed),
+      census_every_s_(options.seconds /
+                      std::clamp(options.seconds / 30, kLeastCensuses, kMostCensuses)) {}
 
 Result<std::unique_ptr<Soak>> Soak::create(const SoakOptions& options) {
   count_gl_objects();
@@ -156,11 +168,9 @@ void Soak::tick() {
     next_injection_ = time + kWarmUp;
   }
   result_.daemon_seconds = to_seconds(time - *begin_);
-  const double share = result_.daemon_seconds / options_.seconds;
-  if (result_.daemon_seconds >= to_seconds(kWarmUp) * 0.9 &&
-      share * kMeasurements >= static_cast<double>(next_holdings_)) {
-    next_holdings_ = static_cast<std::size_t>(share * kMeasurements) + 1;
-    result_.holdings.push_back(Holdings::now());
+  if (!options_.virtual_time && load_.busy()) {
+    busy_ = time;
+    result_.busy_seconds += to_seconds(time - last_tick_);
   }
   const ServiceStatus status = daemon_->status();
   for (std::optional<Active>& active : active_) {
@@ -174,12 +184,30 @@ void Soak::tick() {
   // What was begun is given the time to end.
   const bool enough = result_.daemon_seconds >= options_.seconds;
   const bool idle = std::ranges::none_of(active_, [](const auto& one) { return one.has_value(); });
-  if (enough && idle) stop_ = true;
-  if (!enough && time >= next_injection_) {
+  take_census(idle);
+  const bool due = census_due();
+  if (enough && !due) stop_ = true;
+  if (!enough && !due && time >= next_injection_) {
     next_injection_ = time + from_seconds(options_.pause_s * 2 * random_.uniform());
     if (const InjectionKind* kind = choose()) begin(*kind);
   }
   last_tick_ = now();
+}
+
+// The one that comes after those that were taken; the first when all is warm.
+bool Soak::census_due() const {
+  return result_.daemon_seconds >=
+         std::max(0.9 * to_seconds(kWarmUp),
+                  census_every_s_ * static_cast<double>(result_.holdings.size()) * (1 - 1e-9));
+}
+
+void Soak::take_census(bool idle) {
+  if (!idle) {
+    idle_since_.reset();
+    return;
+  }
+  if (!idle_since_) idle_since_ = now();
+  if (census_due() && now() - *idle_since_ >= kCalm) result_.holdings.push_back(Holdings::now());
 }
 
 const InjectionKind* Soak::choose() {
@@ -191,6 +219,10 @@ const InjectionKind* Soak::choose() {
     if (kind.when == When::kRealTime && options_.virtual_time) return false;
     if (kind.when == When::kVirtualTime && !options_.virtual_time) return false;
     if (kind.group == Group::kProjector && !laws_.control_opened) return false;
+    // In real time a snapshot waits for a frame, and we for the snapshot.
+    const bool snapshots =
+        kind.group == Group::kDisk || kind.injection == Injection::kConcurrentCalls;
+    if (snapshots && !options_.virtual_time && busy(Group::kOutput)) return false;
     // What needs a new renderer is rightly refused while none can be made.
     const bool needs_renderer = kind.group == Group::kFiles || kind.group == Group::kCalls;
     if (needs_renderer && switches_.is_on(Injection::kGpuRefusesToOpen)) return false;
@@ -245,8 +277,11 @@ void Soak::end(Active& active) {
   }
   if (active.kind->group == Group::kDisk) {
     if (injection == Injection::kDiskGone) stage_->block_state(false);
-    if (const auto written = daemon_->snapshot(); !written)
-      violate(fmt::format("no snapshot on a good disk: {}", written.error().what));
+    // Without one the daemon looks by itself whether the disk is good again.
+    if (options_.virtual_time || !active_[static_cast<std::size_t>(Group::kOutput)]) {
+      if (const auto written = daemon_->snapshot(); !written)
+        violate(fmt::format("no snapshot on a good disk: {}", written.error().what));
+    }
   }
   if ((injection == Injection::kLightStorm || injection == Injection::kMaterialStorm) &&
       !active_[static_cast<std::size_t>(Group::kFiles)]) {
@@ -281,6 +316,11 @@ void Soak::look_for_recovery(Active& active, const ServiceStatus& status) {
     tally.longest = std::max(tally.longest, took);
     ++tally.recovered;
     active.kind = nullptr;
+  } else if (kind.fault == FaultKind::kLate && busy_ && now() - *busy_ <= recovery_limit(kind)) {
+    // Frames are late for want of a processor; the time runs from when there is one.
+    if (took <= kNeverCalm) return;
+    ++tally.untold;
+    active.kind = nullptr;
   } else if (took > recovery_limit(kind)) {
     violate(fmt::format("{}: not over {:.2f} s after its cause ({}; {})",
                         kind.name,
@@ -298,7 +338,8 @@ void Soak::watch_picture(const ServiceStatus& status) {
   const bool must_be_dark = !output_out && (status.state == service::State::kBlank ||
                                             status.state == service::State::kFault);
   dark_ticks_ = must_be_dark ? dark_ticks_ + 1 : 0;
-  if (dark_ticks_ == kFewFrames && picture.lit > 0)
+  const bool busy = busy_ && now() - *busy_ < 1s;
+  if (dark_ticks_ == (busy ? kManyFrames : kFewFrames) && picture.lit > 0)
     violate(fmt::format("{} pixels are lit, and the state is {}", picture.lit, faults_of(status)));
   if (now() - picture.shown_at > 200ms + jumped_ || picture.lit == 0)
     result_.dark_seconds += to_seconds(now() - last_tick_);

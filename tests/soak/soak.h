@@ -17,6 +17,7 @@
 #include "tests/soak/display.h"
 #include "tests/soak/faulty_devices.h"
 #include "tests/soak/injections.h"
+#include "tests/soak/machine_load.h"
 #include "tests/soak/stage.h"
 
 namespace veneer::soak {
@@ -36,7 +37,8 @@ struct Tally {
   std::uint64_t met = 0;        ///< how often a device failed because of it
   std::uint64_t listed = 0;     ///< injections that the daemon named among its faults
   std::uint64_t recovered = 0;  ///< within its time
-  Duration longest{};           ///< recovery
+  std::uint64_t untold = 0;  ///< nobody can say: the machine was busy with other things all along
+  Duration longest{};        ///< recovery
 };
 
 struct SoakResult {
@@ -51,7 +53,10 @@ struct SoakResult {
   double dark_seconds = 0;  ///< nothing was lit, or an old picture stood still
   double real_seconds = 0;
   double daemon_seconds = 0;
-  std::vector<Holdings> holdings;  ///< at twenty moments, evenly, the first before any injection
+  double busy_seconds = 0;  ///< other programs kept the machine busy
+  /// At moments that are spread evenly and at which nothing was wrong: the first before any
+  /// injection, each other once what was begun is over, so that like is compared with like.
+  std::vector<Holdings> holdings;
 };
 [[nodiscard]] std::string text_of(const SoakResult& result);
 
@@ -83,6 +88,8 @@ class Soak {
   void storm(Injection injection);
   void break_file(Injection injection);
   void look_for_recovery(Active& active, const service::ServiceStatus& status);
+  [[nodiscard]] bool census_due() const;
+  void take_census(bool idle);
   void watch_picture(const service::ServiceStatus& status);
   void jump(Duration by);
   void stop_for_a_second();
@@ -107,9 +114,12 @@ class Soak {
   std::optional<Time> begin_;
   Time last_tick_;
   Time next_injection_;
+  MachineLoad load_;
+  std::optional<Time> busy_;        // when the machine last was
+  std::optional<Time> idle_since_;  // nothing has been wrong
+  double census_every_s_;
   int dark_ticks_ = 0;  // that it should have been dark
   int lost_ticks_ = 0;  // that no pose has come
-  std::size_t next_holdings_ = 0;
   int storm_step_ = 0;
 };
 

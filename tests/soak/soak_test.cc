@@ -101,7 +101,7 @@ void expect_endured(const SoakResult& result) {
   EXPECT_GT(result.picture.brightest_nits, 0.5 * kCeiling_nits) << "the ceiling was never near";
   for (const InjectionKind& kind : injection_kinds()) {
     const Tally& tally = result.tallies[static_cast<std::size_t>(kind.injection)];
-    EXPECT_EQ(tally.recovered, tally.injected) << kind.name;
+    EXPECT_EQ(tally.recovered + tally.untold, tally.injected) << kind.name;
     EXPECT_TRUE(tally.met > 0 || tally.injected <= 3) << kind.name << " never had an effect";
   }
   expect_flat(result);
@@ -117,7 +117,7 @@ TEST(Soak, EnduresVirtualTime) {
   if (const std::string why = no_gl(); !why.empty()) GTEST_SKIP() << why;
   SoakOptions options;
   options.ceiling_nits = kCeiling_nits;
-  options.seconds = 60 * minutes_of("VENEER_SOAK_MINUTES", 5);
+  options.seconds = 60 * minutes_of("VENEER_SOAK_MINUTES", 4);
   const auto soak = Soak::create(options);
   ASSERT_TRUE(soak) << soak.error().what;
   const auto result = (*soak)->run();
@@ -128,11 +128,9 @@ TEST(Soak, EnduresVirtualTime) {
   EXPECT_GE(static_cast<double>(result->injected), options.seconds / 3.6);
 }
 
-// On a machine that is busy with other things frames come late whatever the daemon does, so this is
-// run by ./dev soak, alone.
+// A ctest of its own, which runs alone: on a busy machine frames come late whatever the daemon
+// does.
 TEST(Soak, EnduresRealTime) {
-  if (std::getenv("VENEER_SOAK_REAL_MINUTES") == nullptr)
-    GTEST_SKIP() << "set VENEER_SOAK_REAL_MINUTES, or run ./dev soak";
   if (const std::string why = no_gl(); !why.empty()) GTEST_SKIP() << why;
   SoakOptions options;
   options.virtual_time = false;

@@ -132,9 +132,8 @@ frames = {}
 [render]
 luminance_ceiling = {}
 [control]
-driver = "pjlink"
-host = "127.0.0.1"
-poll_s = 10
+driver = "dlpc350"
+poll_s = 1
 [tracker]
 driver = "simulated"
 rate_hz = {}
