@@ -33,6 +33,13 @@ double milliseconds_since(SteadyTime begin) {
   return milliseconds(std::chrono::steady_clock::now() - begin);
 }
 
+/// What this thread has computed so far; no wait is in it.
+Duration computed() {
+  timespec used{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
+  return std::chrono::seconds(used.tv_sec) + std::chrono::nanoseconds(used.tv_nsec);
+}
+
 /// What CLOCK_BOOTTIME is ahead of CLOCK_MONOTONIC: the time that the machine has slept.
 Duration time_asleep() {
   timespec boot{};
@@ -217,6 +224,7 @@ FrameLoop::Made FrameLoop::make_frame(const Slot& slot, FrameRecord& record) {
     frame.buffer = *buffer;
   }
   const SteadyTime begin = std::chrono::steady_clock::now();
+  const Duration computed_before = computed();
   renderer.draw(look(slot, record));
   frame.number = record.number;
   frame.bits = show_->script.profile.bits;
@@ -235,14 +243,17 @@ FrameLoop::Made FrameLoop::make_frame(const Slot& slot, FrameRecord& record) {
   if (renderer.lost()) return lose_renderer();
   record.statistics = renderer.statistics();
   const double drawn_ms = milliseconds_since(begin);
+  const double computed_ms = milliseconds(computed() - computed_before);
   const Made made = made_of(parts_.output.present(frame));
   record.frame_ms = milliseconds_since(begin);
 
   service::LatencyBudget& budget = record.latency_ms;
   const double gpu_ms = record.statistics.gpu_ms.value_or(0);
-  budget.gpu_draw = record.statistics.draw_ms.value_or(gpu_ms);
-  budget.compensate = std::max(0.0, gpu_ms - budget.gpu_draw);
-  budget.draw = std::max(0.0, drawn_ms - gpu_ms);
+  const double gpu_draw_ms = record.statistics.draw_ms.value_or(gpu_ms);
+  budget.compensate = std::max(0.0, gpu_ms - gpu_draw_ms);
+  // A software rasteriser does a part of the passes in our thread, and its timers do not count it.
+  budget.draw = std::max(0.0, computed_ms - record.statistics.software_ms.value_or(0));
+  budget.gpu_draw = std::max(gpu_draw_ms, drawn_ms - budget.draw - budget.compensate);
   budget.present = record.frame_ms - drawn_ms;
   budget.display = std::max(0.0, milliseconds(record.display_time - parts_.clock.now()));
   if (pacer_) pacer_->took(std::chrono::steady_clock::now() - begin);

@@ -280,8 +280,7 @@ class Bench {
   // cost of issuing the commands; never above it. Software rasterisers have been seen to count only
   // the part of a draw that runs on their worker threads.
   [[nodiscard]] bool queries_are_plausible() const {
-    const std::string_view renderer = context_.description();
-    if (renderer.starts_with("llvmpipe") || renderer.starts_with("softpipe")) return false;
+    if (context_.is_software()) return false;
     return std::ranges::all_of(entrants_, [](const Entrant& entrant) {
       const double query = quantile(entrant.query_ms, 0.5);
       return query > 0.0 && query <= 1.05 * quantile(entrant.finish_ms, 0.5);

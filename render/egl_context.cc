@@ -286,4 +286,8 @@ void* EglContext::display() const { return state_->display.handle(); }
 
 const std::string& EglContext::description() const { return state_->description; }
 
+bool EglContext::is_software() const {
+  return description().starts_with("llvmpipe") || description().starts_with("softpipe");
+}
+
 }  // namespace veneer::render

@@ -45,6 +45,8 @@ class EglContext {
   [[nodiscard]] void* display() const;
   /// "llvmpipe (LLVM 15.0.6, 256 bits), 4.5 (Core Profile) Mesa 22.3.6, through surfaceless".
   [[nodiscard]] const std::string& description() const;
+  /// Whether processors draw, in the calls of GL and on threads of the driver.
+  [[nodiscard]] bool is_software() const;
 
  private:
   struct State;

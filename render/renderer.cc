@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/renderer.h"
 
+#include <time.h>
+
+#include <chrono>
 #include <optional>
 #include <utility>
 
@@ -15,6 +18,13 @@
 
 namespace veneer::render {
 namespace {
+
+/// What this thread has computed so far.
+std::chrono::nanoseconds thread_time() {
+  timespec used{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
+  return std::chrono::seconds(used.tv_sec) + std::chrono::nanoseconds(used.tv_nsec);
+}
 
 bool is_finite(const DirectionalLight& light) {
   return light.direction_to_light.allFinite() && light.illuminance_rgb.allFinite();
@@ -134,6 +144,7 @@ class GlRenderer final : public Renderer {
 
   void draw(const FrameInput& input) override {
     context_.make_current();
+    const std::chrono::nanoseconds begin = software_ ? thread_time() : std::chrono::nanoseconds{};
     timer_.begin();
     if (is_sound(input)) {
       draw_.draw(target_framebuffer_.id(),
@@ -146,6 +157,8 @@ class GlRenderer final : public Renderer {
     compensate_.run(target_.id(), input.dither_seed);
     timer_.end();
     glFlush();
+    if (software_)
+      software_ms_ = std::chrono::duration<double, std::milli>(thread_time() - begin).count();
   }
 
   void read_codes(ImageView<Rgb16> codes) override {
@@ -177,6 +190,7 @@ class GlRenderer final : public Renderer {
       statistics.gpu_ms = times->all_ms;
       statistics.draw_ms = times->first_ms;
     }
+    if (software_) statistics.software_ms = software_ms_;
     return statistics;
   }
 
@@ -193,6 +207,7 @@ class GlRenderer final : public Renderer {
         height_(prepared.profile().geometry.height),
         bits_(prepared.profile().bits),
         ceiling_(prepared.compensation().ceiling().nits()),
+        software_(context_.is_software()),
         mesh_(mesh),
         target_(make_texture_2d(GL_RGBA16F, width_, height_)),
         depth_(make_texture_2d(GL_DEPTH_COMPONENT32F, width_, height_)),
@@ -227,6 +242,8 @@ class GlRenderer final : public Renderer {
   int height_;
   int bits_;
   double ceiling_;
+  bool software_;
+  double software_ms_ = 0;
   MeshBuffers mesh_;
   GlTexture target_;
   GlTexture depth_;

@@ -66,6 +66,9 @@ struct FrameStatistics {
   std::uint64_t held_pixels = 0;  ///< brought down to RendererOptions::luminance_ceiling
   std::optional<double> gpu_ms;   ///< GL timer query: draw and compensation
   std::optional<double> draw_ms;  ///< of this, the draw pass
+  /// Processor time of the thread that called draw(), in the GL calls that draw: with a software
+  /// rasteriser those transform vertices and sort triangles. Nothing where a GPU draws.
+  std::optional<double> software_ms;
 };
 
 /// Draws a scene's material as the projector must show it. Owns the EGL context and every GL

@@ -63,8 +63,8 @@ struct LatencyBudget {
   double tracker = 0;     ///< from the sample's time stamp to its arrival here
   double hand_off = 0;    ///< from its arrival until the frame loop could read it
   double wait = 0;        ///< from then until a frame took it up
-  double draw = 0;        ///< the frame loop's own work, without the GPU
-  double gpu_draw = 0;    ///< the GPU's draw pass
+  double draw = 0;        ///< what the frame loop's thread computes: processor time, no waits
+  double gpu_draw = 0;    ///< the GPU's draw pass, and what is waited for it beyond both passes
   double compensate = 0;  ///< the GPU's compensate pass
   double present = 0;     ///< handing the frame to the output
   double display = 0;     ///< from there to the light, as the output says or as is configured

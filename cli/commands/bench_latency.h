@@ -19,7 +19,8 @@ struct BenchLatencyOptions {
 ///
 /// The gate: the tracker's transport, the hand-over, the frame loop's own work and the handing to
 /// the output take less than 0.5 ms together, medians. Waiting for a frame's turn, the GPU's passes
-/// and the display are not in it. Missed: exit code 3.
+/// and the display are not in it; with a software rasteriser the GL calls that draw count as those
+/// passes, so that only a GPU shows what issuing them costs. Missed: exit code 3.
 /// Errors: kInvalidOption, kIo (veneerd failed), kBadFormat (its summary).
 [[nodiscard]] Result<int> bench_latency(const BenchLatencyOptions& options, CommandLine& line);
 
