@@ -80,8 +80,9 @@ void expect_flat(const SoakResult& result) {
   EXPECT_LE(late.gl_objects, early.gl_objects) << text_of(late);
   // What the injections between the two may keep, each: less than anything that is lost with each.
   constexpr std::int64_t kBytesAnInjection = 100;
-  // And what one calm moment holds beside another; 10 kB were seen, and a renderer has megabytes.
-  constexpr std::int64_t kBytesOfAMoment = 128 << 10;
+  // And what one calm moment holds beside another, and threads and drivers keep when they are new:
+  // 10 kB were seen in an hour, 120 kB in two minutes. A renderer has megabytes.
+  constexpr std::int64_t kBytesOfAMoment = 256 << 10;
   const auto allowed =
       kBytesOfAMoment + kBytesAnInjection * static_cast<std::int64_t>(result.injected / 2);
   EXPECT_LE(late.heap_bytes - early.heap_bytes, allowed) << text_of(early) << "\n" << text_of(late);
