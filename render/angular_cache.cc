@@ -56,18 +56,6 @@ std::string most_turn_constant(double most_turn) {
 
 }  // namespace
 
-Status AngularCacheOptions::check() const {
-  if (spacing != 0 && (spacing < 4 || spacing > 128))
-    return fail(Errc::kInvalidOption,
-                "angular cache: the spacing is {} pixels; it must be 0 (none) or 4 to 128",
-                spacing);
-  if (!(most_turn > 0.0 && most_turn <= 1.0))
-    return fail(Errc::kInvalidOption,
-                "angular cache: most_turn is {}; it must be above 0, at most 1",
-                most_turn);
-  return {};
-}
-
 std::string cache_nodes_fragment_source(int light_count) {
   return surface_header(light_count) + kNodesFrag;
 }

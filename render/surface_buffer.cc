@@ -43,13 +43,6 @@ Target colour_target(GLuint framebuffer) {
 
 }  // namespace
 
-Result<Evaluation> parse_evaluation(std::string_view text) {
-  if (text == "fragment") return Evaluation::kFragment;
-  if (text == "compute") return Evaluation::kCompute;
-  return fail(
-      Errc::kInvalidOption, "evaluation is \"{}\"; it may be \"fragment\" or \"compute\"", text);
-}
-
 std::string store_surface_fragment_source(int light_count) {
   return surface_header(light_count) + kWordsGlsl + kStoreFrag;
 }
