@@ -84,6 +84,12 @@ bool goes_on_with_a_name(std::string_view header) {
          std::string_view("_-\"']").find(header.front()) != std::string_view::npos;
 }
 
+/// Whether toml++ takes the quote at `i` for the begin of a string: not within a bare word, as in
+/// -"a".
+bool may_begin_string(std::string_view text, std::size_t i) {
+  return i == 0 || std::string_view(" \t\r\n=,.[{\xBF").find(text[i - 1]) != std::string_view::npos;
+}
+
 /// Where a text has what toml++ 3.3 takes to be impossible, so that its behaviour is undefined.
 struct Impossible {
   std::size_t at;
@@ -100,7 +106,7 @@ std::optional<Impossible> find_impossible(std::string_view text) {
     const char c = text[i];
     if (c == '#') {
       i = std::min(text.find('\n', i), text.size());
-    } else if (c == '"' || c == '\'') {
+    } else if ((c == '"' || c == '\'') && may_begin_string(text, i)) {
       i = end_of_string(text, i);
       line_begins = false;
     } else if (static_cast<unsigned char>(c) >= 0x80) {

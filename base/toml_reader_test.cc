@@ -47,6 +47,7 @@ TEST(TomlReader, LettersBeyondAsciiStandInQuotesAndComments) {
   // Most of these once ran into what toml++ takes to be impossible.
   for (const char* wrong : {"a = 1\nna\u00efve = 1\n",
                             "a = 1\nb = \u00fc\n",
+                            "a = 1\nb = -\"\u00fc\"\n",
                             "a = 1\nw\u03fb = 2\n",
                             "a = '1'\n\u00a0b = 2\n",
                             "a = \"\"\"1\"\"\"\n\u3000",
