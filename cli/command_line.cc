@@ -16,12 +16,35 @@ namespace {
 /// Ends a command whose declarations were all that was wanted. No error, and not for its eyes.
 struct Declared {};
 
+/// What is wrong with a command line, as "veneer tell: ...", and where it is explained.
+std::string mistake_in(const CLI::App* app, const CLI::Error& error) {
+  std::string name = app->get_name();
+  while (!app->get_subcommands().empty()) {
+    app = app->get_subcommands().front();
+    name += " " + app->get_name();
+  }
+  std::string what = error.what();
+  if (app->get_require_subcommand_min() > 0 && error.get_name() == "RequiredError") {
+    // CLI11 says no more than that one is required.
+    std::string known;
+    for (const CLI::App* each : app->get_subcommands([](const CLI::App*) { return true; })) {
+      if (!each->get_name().empty()) known += (known.empty() ? "" : ", ") + each->get_name();
+    }
+    const std::vector<std::string> unknown = app->remaining();
+    what = fmt::format("{}say what to do: {}",
+                       unknown.empty() ? "" : fmt::format("there is no \"{}\"; ", unknown.front()),
+                       known);
+  }
+  return fmt::format("{}: {}\n{} --help explains it.\n", name, what, name);
+}
+
 }  // namespace
 
 CommandLine::CommandLine(const std::string& name,
                          std::string summary,
                          std::vector<std::string> arguments)
     : app_(std::move(summary), "veneer " + name), arguments_(std::move(arguments)) {
+  app_.failure_message(&mistake_in);
   app_.add_flag("--json", json_, "Print one JSON object on standard output and nothing else there");
   app_.add_flag("--quiet", quiet_, "Show no progress");
 }

@@ -126,6 +126,8 @@ TEST_F(ProjectorProgram, WrongUsageAndNobodyThereAreTold) {
   EXPECT_TRUE(fails(projector(fake, "input hdmi"), 2, "digital1"));
   EXPECT_TRUE(fails(projector(fake, "degamma-off"), 1, "own menu"));
   EXPECT_TRUE(fails(run("veneer projector status"), 2, "[control]"));
+  EXPECT_TRUE(fails(run("veneer projector"), 2, "say what to do: status, search, on, off, "));
+  EXPECT_TRUE(fails(run("veneer projector dance"), 2, "there is no \"dance\""));
   EXPECT_TRUE(fails(run("veneer projector --driver rs232 status"), 2, "pjlink"));
   EXPECT_TRUE(fails(projector(fake, "--password-file /dev/zero status"), 1, "first line"));
   int port = 0;

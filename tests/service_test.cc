@@ -79,6 +79,7 @@ TEST_F(ServiceTest, StatusIsOneObjectForPrograms) {
 TEST_F(ServiceTest, StatusSaysWhereToLookWhenThereIsNoService) {
   server_.reset();
   EXPECT_TRUE(fails(run("veneer status " + option()), 1, "systemctl status veneerd"));
+  EXPECT_TRUE(fails(run("veneer tell blank " + option()), 1, "[service]"));
   bus_.stop();
   EXPECT_TRUE(fails(run("veneer status " + option()), 1, "dbus-daemon"));
   EXPECT_TRUE(fails(run("veneer status --bus sytem"), 2, "is no message bus"));
@@ -115,8 +116,11 @@ TEST_F(ServiceTest, TellSaysWhyItIsRefused) {
         << each;
   EXPECT_TRUE(fails(run("veneer tell light 0 0,0,1 nan " + option()), 2, "lux"));
   EXPECT_TRUE(fails(run("veneer tell light -- -1 0,0,1 5 " + option()), 2, ""));
-  EXPECT_TRUE(fails(run("veneer tell dance " + option()), 2, ""));
-  EXPECT_TRUE(fails(run("veneer tell"), 2, ""));
+  EXPECT_TRUE(fails(run("veneer tell dance " + option()), 2, "there is no \"dance\"; say what"));
+  EXPECT_TRUE(fails(run("veneer tell"), 2, "veneer tell: say what to do: blank, unblank, "));
+  EXPECT_TRUE(fails(run("veneer tell light 0"), 2, "veneer tell light --help"));
+  // A mistake is told before it is asked whether there is a service.
+  EXPECT_TRUE(fails(run("veneer tell light 0 0,0,0 5 --bus unix:path=/nowhere"), 2, "direction"));
   EXPECT_THAT(control_.told(), ElementsAre("material /x"));
 }
 

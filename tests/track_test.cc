@@ -273,7 +273,7 @@ TEST_F(TrackTest, ALatencyThatIsNotKnownIsNotTold) {
 }
 
 TEST_F(TrackTest, MistakesAreNamed) {
-  EXPECT_TRUE(fails(run("veneer track"), 2, "subcommand"));
+  EXPECT_TRUE(fails(run("veneer track"), 2, "say what to do: "));
   EXPECT_TRUE(fails(run("veneer track watch"), 2, "config"));
   EXPECT_TRUE(fails(run("veneer track watch nothing.toml"), 1, "nothing.toml"));
   EXPECT_TRUE(fails(run("veneer track replay nothing.jsonl"), 1, "nothing.jsonl"));

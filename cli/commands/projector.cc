@@ -65,9 +65,10 @@ Result<std::unique_ptr<ProjectorControl>> open_control(const ProjectorOptions& o
                                                        Clock& clock) {
   const std::vector<std::string> settings = settings_of(options);
   if (options.config.empty() && settings.empty())
-    return fail(Errc::kInvalidOption,
-                "name a file with a [control] table with --config, or a driver "
-                "with --driver");
+    return fail(
+        Errc::kInvalidOption,
+        "say which projector: --driver pjlink --host ADDRESS, or --driver dlpc350, or --config "
+        "FILE with a [control] table; veneer projector search lists those on the network");
   std::string text;
   for (const std::string& each : settings) text += each + "\n";
   VENEER_ASSIGN(TomlReader toml,

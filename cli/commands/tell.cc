@@ -92,6 +92,7 @@ Result<int> run_tell(CommandLine& line) {
       ->capture_default_str();
   line.parse();
   VENEER_ASSIGN(const service::Command what, command());
+  VENEER_TRY(service::check(what));  // before it is asked whether anybody is there
   VENEER_ASSIGN(const service::BusAddress address, service::BusAddress::parse(options.bus));
   VENEER_ASSIGN(service::BusClient client, service::BusClient::connect(address));
   VENEER_ASSIGN(const std::string answer, client.tell(what));

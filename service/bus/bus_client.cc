@@ -42,8 +42,8 @@ Error error_of(const std::string& doing, const sdbus::Error& error, const BusAdd
   const std::string_view kind = name_after_last_dot(name);
   if (kind == "ServiceUnknown" || kind == "NameHasNoOwner" || kind == "UnknownObject")
     return {Errc::kUnavailable,
-            fmt::format("{}: there is no veneerd on {}; is the service running? "
-                        "systemctl status veneerd",
+            fmt::format("{}: there is no veneerd on {}; is it running (systemctl status veneerd), "
+                        "and does its configuration name this bus (bus = \"system\" in [service])?",
                         doing,
                         address.name())};
   if (kind == "AccessDenied")

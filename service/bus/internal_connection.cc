@@ -2,6 +2,16 @@
 #include "service/bus/internal_connection.h"
 
 namespace veneer::service {
+namespace {
+
+std::string_view remedy_for(const BusAddress& address) {
+  if (address.text() == "system") return "is dbus-daemon running? systemctl status dbus";
+  if (address.text() == "session")
+    return "only a desktop's session has one, and tells it by DBUS_SESSION_BUS_ADDRESS";
+  return "is it the right address, and does a dbus-daemon listen there?";
+}
+
+}  // namespace
 
 Result<std::unique_ptr<sdbus::IConnection>> connect_to(const BusAddress& address,
                                                        Duration call_timeout) {
@@ -18,9 +28,10 @@ Result<std::unique_ptr<sdbus::IConnection>> connect_to(const BusAddress& address
     return connection;
   } catch (const sdbus::Error& error) {
     return fail(Errc::kUnavailable,
-                "connecting to {}: {}; is dbus-daemon running?",
+                "connecting to {}: {}; {}",
                 address.name(),
-                error.getMessage());
+                error.getMessage(),
+                remedy_for(address));
   }
 }
 
