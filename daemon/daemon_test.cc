@@ -368,6 +368,23 @@ TEST_F(DaemonTest, GoodFilesAreTriedAgainUntilARendererCanBeMadeOfThem) {
   EXPECT_EQ(hand_.presented, static_cast<std::uint64_t>(202 + over)) << "no frame was lost";
 }
 
+TEST_F(DaemonTest, AConfigurationThatIsGoodAgainIsNoFaultHoweverTheProfileIs) {
+  run(20, [&](int frame, service::ServiceControl& control) {
+    if (frame != 10) return;
+    // The same file comes back, so that nothing but the profile is read.
+    std::filesystem::rename(at("veneer.toml"), at("good.toml"));
+    write_config("[[[");
+    EXPECT_FALSE(control.reload());
+    std::filesystem::rename(at("good.toml"), at("veneer.toml"));
+    std::filesystem::rename(at("profile"), at("away"));
+    EXPECT_FALSE(control.reload());
+    std::filesystem::rename(at("away"), at("profile"));
+    const auto faults = control.status().faults;
+    ASSERT_EQ(faults.size(), 1U);
+    EXPECT_EQ(faults[0].kind, FaultKind::kProfile);
+  });
+}
+
 TEST_F(DaemonTest, ASnapshotHasTheCodesOfTheFrame) {
   run(20, [&](int frame, service::ServiceControl& control) {
     if (frame != 10) return;

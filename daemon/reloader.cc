@@ -80,6 +80,10 @@ Status Reloader::read_all() {
   const bool same_files =
       !overridden_ && now.profile == config->profile && stamps_of(file_.path, named) == shown_;
   if (same_files) {
+    // They are what is shown, however the profile turns out.
+    for (const FaultKind kind :
+         {FaultKind::kConfiguration, FaultKind::kScene, FaultKind::kMaterial})
+      faults_.end(kind, clock_.now());
     const Status checked = loader_.check_profile();
     // Its watcher tries again by itself.
     refused_.reset();
