@@ -9,19 +9,18 @@ show=$3
 # shellcheck source=tests/lab/expect.sh
 . "$source/tests/lab/expect.sh"
 
-# Compile shaders without making them fast, and once.
-export GALLIVM_PERF=nopt MESA_SHADER_CACHE_DIR=/run/shaders STATE_DIRECTORY=/run/state
+# Wide vectors are slow in emulation; shaders are compiled once.
+export LP_NATIVE_VECTOR_WIDTH=128 MESA_SHADER_CACHE_DIR=/run/shaders STATE_DIRECTORY=/run/state
 mkdir -p /run/state
 veneerd=("$bin/veneerd" --quiet --config "$show/veneer.toml")
 
-expect "frames are drawn into files" "${veneerd[@]}" --set frames=6 --set 'output.driver="file"' \
+expect "frames are drawn into files" "${veneerd[@]}" --set frames=2 --set 'output.driver="file"' \
   --set 'output.folder="/run/lab/frames"'
 expected=$(find /run/lab/frames -name '*.png' | sort | tail -n 1)
 
-shows_the_frame() {
-  "$source/tests/lab/keep_screen.sh" daemon && python3 "$source/tests/lab/compare_pictures.py" "$expected" \
-    /run/lab/daemon.ppm 1
-}
+keep_screen() { "$source/tests/lab/keep_screen.sh" daemon; }
+is_the_frame() { python3 "$source/tests/lab/compare_pictures.py" "$expected" /run/lab/daemon.ppm 1; }
+shows_the_frame() { keep_screen && is_the_frame; }
 log=/run/lab/veneerd.log
 "${veneerd[@]}" --set 'output.driver="kms"' >"$log" 2>&1 &
 daemon=$!
@@ -30,6 +29,7 @@ kill -TERM "$daemon"
 status=0
 wait "$daemon" || status=$?
 expect "veneerd ends well" test "$status" = 0
-expect_not "and let go of the screen" shows_the_frame
+expect "the screen is kept" keep_screen
+expect_not "of which it let go" is_the_frame
 cat "$log"
 expect_end

@@ -57,9 +57,10 @@ service() {
   local packages
   need_users
   need_show
+  rm -rf "$work/service"
   packages=("$source"/out/veneer_*.deb)
   [[ -f ${packages[-1]} ]] || { echo "no package in out/; make it: ./dev package" >&2; return 1; }
-  LAB_INIT=systemd LAB_SECONDS=700 \
+  LAB_INIT=systemd LAB_SCREEN=96x72 LAB_OUT=$work/service LAB_SECONDS=700 \
     "$kernel" "$work" "$source/tests/lab/service.sh" "${packages[-1]}" "$source" "$show"
 }
 
