@@ -96,11 +96,11 @@ struct Impossible {
   const char* what;
 };
 /// A character beyond ASCII outside of strings and comments, where TOML has none (most of them are
-/// too much for is_non_ascii_horizontal_whitespace), or a header that begins with no name
-/// (parse_key).
+/// too much for is_non_ascii_horizontal_whitespace), a header that begins with no name (parse_key),
+/// or a brace in the place of a value (parse_value).
 std::optional<Impossible> find_impossible(std::string_view text) {
   std::size_t i = text.starts_with("\xEF\xBB\xBF") ? 3 : 0;  // a byte order mark
-  int depth = 0;                                             // of brackets and braces
+  std::string open;                                          // brackets and braces
   bool line_begins = true;
   while (i < text.size()) {
     const char c = text[i];
@@ -113,11 +113,13 @@ std::optional<Impossible> find_impossible(std::string_view text) {
       return Impossible{i,
                         "a character that is not ASCII stands outside of quotes; put the key or "
                         "value in quotes"};
-    } else if (c == '[' && line_begins && depth == 0 && !goes_on_with_a_name(text.substr(i))) {
+    } else if (c == '[' && line_begins && open.empty() && !goes_on_with_a_name(text.substr(i))) {
       return Impossible{i, "a table's name should follow the bracket, as in [render]"};
+    } else if (c == '}' && open.ends_with('[')) {
+      return Impossible{i, "a brace closes what a bracket has opened"};
     } else {
-      if (c == '[' || c == '{') ++depth;
-      if ((c == ']' || c == '}') && depth > 0) --depth;
+      if (c == '[' || c == '{') open += c;
+      if ((c == ']' || c == '}') && !open.empty()) open.pop_back();
       line_begins = c == '\n' || (line_begins && (c == ' ' || c == '\t'));
       ++i;
     }

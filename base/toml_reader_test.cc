@@ -74,7 +74,17 @@ TEST(TomlReader, RefusesATableWithoutAName) {
     EXPECT_NE(toml.error().what.find("t:3: a table's name should follow"), std::string::npos)
         << toml.error().what;
   }
-  for (const char* wrong : {"[", "[[", "[]", "[[]]", "[ [a]]", "[a", "[a]]", "a = ["})
+  for (const char* wrong : {"[",
+                            "[[",
+                            "[]",
+                            "[[]]",
+                            "[ [a]]",
+                            "[a",
+                            "[a]]",
+                            "a = [",
+                            "a = [1, }",
+                            "a = [\n}\n",
+                            "a = }"})
     EXPECT_FALSE(TomlReader::parse(wrong, "t")) << wrong;
 }
 
