@@ -174,7 +174,7 @@ class VerifyOnARig : public ProjectorProgram {
       readings.patches.push_back(
           {drive, profile.emitted(profile.linear_drive(code)) + profile.black});
     };
-    for (const auto& patch : calibration::verification_patches(profile, 8, 2, false))
+    for (const auto& patch : calibration::verification_patches(profile, kPatches, 2, false))
       add(patch.code);
     for (const auto& code : std::vector<std::array<std::uint16_t, 3>>{
              {0, 0, 0}, {255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {255, 255, 255}})
@@ -192,10 +192,11 @@ class VerifyOnARig : public ProjectorProgram {
   /// A person who says "done" whenever asked to point the instrument.
   Outcome verify(const std::string& more = "") {
     const std::string line = fmt::format(
-        "printf \"\\n\\n\\n\\n\\n\\n\" | {}/veneer verify {} --patches 8 --repeats 1 "
+        "printf \"\\n\\n\\n\\n\\n\\n\" | {}/veneer verify {} --patches {} --repeats 1 "
         "--rig {} --profile {} >{} 2>{}",
         VENEER_PROGRAMS,
         more,
+        kPatches,
         at("rig.toml"),
         at("profile"),
         at("out"),
@@ -203,6 +204,8 @@ class VerifyOnARig : public ProjectorProgram {
     const int status = std::system(line.c_str());
     return {WEXITSTATUS(status), *read_text(at("out")), *read_text(at("err"))};
   }
+  /// On the white board and on the object; each is shown for the 0.4 s that an output settles in.
+  static constexpr int kPatches = 2;
   FakeProjector fake_;
 };
 
