@@ -296,7 +296,8 @@ Status TheDaemon::set_light(int index, const service::LightSetting& light) {
 
 Status TheDaemon::reload() {
   VENEER_ASSIGN(Stage* const stage, this->stage());
-  return stage->loader.call([stage] { return stage->reloader.reload(); });
+  return stage->loader.call([stage] { return stage->reloader.reload(); },
+                            ShowLoader::kPatienceWithFiles);
 }
 
 Status TheDaemon::blank(bool on) {

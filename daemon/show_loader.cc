@@ -21,10 +21,10 @@ tl::unexpected<Error> not_running() {
               "telling veneerd: it is not running (starting or stopping); try again in a moment");
 }
 
-tl::unexpected<Error> no_patience() {
+tl::unexpected<Error> no_patience(std::chrono::seconds patience) {
   return fail(Errc::kTimeout,
               "telling veneerd: it was still busy after {} s; nothing was changed; try again",
-              ShowLoader::kPatience.count());
+              patience.count());
 }
 
 }  // namespace
@@ -91,11 +91,9 @@ void ShowLoader::serve() {
     if (!call_ || call_->done) return;
     call = call_;
   }
-  deadline_ = std::chrono::steady_clock::now() + kPatience;
   given_up_ = &call->given_up;
-  Status result = call->given_up ? Status(no_patience()) : call->work();
+  Status result = call->given_up ? Status(no_patience(kPatience)) : call->work();
   given_up_ = nullptr;
-  deadline_ = Instant::max();
   {
     const std::scoped_lock lock(call_mutex_);
     call->result = std::move(result);
@@ -113,7 +111,6 @@ void ShowLoader::remake() {
       !status || !render::check_exchangeable(current_.raster(), script.profile)) {
     script = current_;
   }
-  deadline_ = std::chrono::steady_clock::now() + kPatience;
   Result<std::unique_ptr<Show>> made = make(std::move(script));
   Status status;
   if (made) {
@@ -122,7 +119,6 @@ void ShowLoader::remake() {
   } else {
     status = tl::unexpected<Error>(made.error());
   }
-  deadline_ = Instant::max();
   if (status) {
     backoff_.succeeded();
     return;
@@ -185,17 +181,19 @@ Result<std::unique_ptr<Show>> ShowLoader::make(Script script) {
 
 // Waits until the frame loop has taken it.
 Status ShowLoader::offer(std::unique_ptr<Show> show) {
+  // From here on: however long it took to read and to make it.
+  const Instant deadline = std::chrono::steady_clock::now() + kPatience;
   Show* offered = show.get();
   if (Show* overtaken = next_.exchange(show.release())) retire(std::unique_ptr<Show>(overtaken));
   if (inline_here()) {
     take_next(*frame_loops_show_);
   } else {
     while (next_.load() != nullptr) {
-      if (!serving_ || std::chrono::steady_clock::now() > deadline_ ||
+      if (!serving_ || std::chrono::steady_clock::now() > deadline ||
           (given_up_ != nullptr && *given_up_)) {
         if (Show* back = next_.exchange(nullptr)) {
           retire(std::unique_ptr<Show>(back));
-          return serving_ ? Status(no_patience()) : Status(not_running());
+          return serving_ ? Status(no_patience(kPatience)) : Status(not_running());
         }
         break;  // taken at the last moment
       }
@@ -245,28 +243,28 @@ void ShowLoader::retire(std::unique_ptr<Show> show) {
 
 // --- the callers' side
 
-Status ShowLoader::call(std::function<Status()> work) {
+Status ShowLoader::call(std::function<Status()> work, std::chrono::seconds patience) {
   if (!serving_) return not_running();
   if (inline_here()) return work();
   if (std::this_thread::get_id() == frame_thread_) {
     return fail(Errc::kUnavailable,
                 "telling veneerd from its own frame loop: it would wait for itself");
   }
-  const Instant deadline = std::chrono::steady_clock::now() + kPatience;
+  const Instant deadline = std::chrono::steady_clock::now() + patience;
   const std::unique_lock turn(turn_, deadline);
-  if (!turn) return no_patience();
+  if (!turn) return no_patience(patience);
   const auto call = std::make_shared<Call>();
   call->work = std::move(work);
   std::unique_lock lock(call_mutex_);
   if (!serving_) return not_running();
   // One whose caller lost patience may still be at work; it sees that it is given up.
   if (!call_done_.wait_until(lock, deadline, [this] { return !call_ || call_->done; }))
-    return no_patience();
+    return no_patience(patience);
   call_ = call;
   wake_.release();
   if (!call_done_.wait_until(lock, deadline, [&] { return call->done; })) {
     call->given_up = true;
-    return no_patience();
+    return no_patience(patience);
   }
   return call->result;
 }

@@ -43,9 +43,13 @@ class ShowLoader {
   /// Runs `work` on the loader's thread and returns what it does, which makes a script of the
   /// current one and calls exchange(). Calls are served one after another. Who calls may lose
   /// patience while it runs: it owns what it needs.
-  /// Errors: those of `work`; kTimeout (not done within kPatience), kUnavailable (stopping).
-  [[nodiscard]] Status call(std::function<Status()> work);
+  /// Errors: those of `work`; kTimeout (not done within `patience`), kUnavailable (stopping).
+  [[nodiscard]] Status call(std::function<Status()> work,
+                            std::chrono::seconds patience = kPatience);
+  /// Of who calls, and with a frame loop that is to take what was made.
   static constexpr std::chrono::seconds kPatience{10};
+  /// Of a reload, which may read a large material from a slow disk.
+  static constexpr std::chrono::seconds kPatienceWithFiles{120};
 
   // For `work`.
 
@@ -117,7 +121,6 @@ class ShowLoader {
   Script current_;
   Show* shown_ = nullptr;  // the frame loop's; it lives until it comes back here
   Backoff backoff_;
-  Instant deadline_ = Instant::max();
   const std::atomic<bool>* given_up_ = nullptr;
 
   // Owned by whoever exchanges them for null: to the frame loop, and back from it.

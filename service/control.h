@@ -21,8 +21,8 @@ struct LightSetting {
 };
 
 /// What a running veneerd can be told and asked: the face that D-Bus, systemd and metrics see. The
-/// daemon implements it. Any thread may call; calls return within ten seconds. What is refused
-/// changes nothing, and what is shown stays.
+/// daemon implements it. Any thread may call; calls return within ten seconds, reload() within two
+/// minutes. What is refused changes nothing, and what is shown stays.
 class ServiceControl {
  public:
   virtual ~ServiceControl() = default;

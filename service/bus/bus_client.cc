@@ -10,8 +10,8 @@ namespace {
 
 /// The service answers questions at once; a machine that swaps may need longer.
 constexpr Duration kAskTimeout = std::chrono::seconds(5);
-/// ServiceControl returns within ten seconds; a few may wait before us.
-constexpr Duration kTellTimeout = std::chrono::seconds(30);
+/// ServiceControl returns within two minutes; another may wait before us.
+constexpr Duration kTellTimeout = std::chrono::seconds(150);
 
 using Triple = sdbus::Struct<double, double, double>;
 
