@@ -42,7 +42,10 @@ class FakeResponder {
     thread_.join();
   }
   [[nodiscard]] int port() const { return port_; }
-  [[nodiscard]] const std::vector<std::string>& questions() const { return questions_; }
+  [[nodiscard]] std::vector<std::string> questions() const {
+    const std::scoped_lock lock(mutex_);
+    return questions_;
+  }
 
  private:
   void serve() {
@@ -55,7 +58,10 @@ class FakeResponder {
       const ssize_t count = ::recvfrom(
           fd_.value(), buffer.data(), buffer.size(), 0, reinterpret_cast<sockaddr*>(&from), &size);
       if (count < 0) continue;
-      questions_.emplace_back(buffer.data(), static_cast<std::size_t>(count));
+      {
+        const std::scoped_lock lock(mutex_);
+        questions_.emplace_back(buffer.data(), static_cast<std::size_t>(count));
+      }
       for (const std::string& answer : answers_)
         ::sendto(fd_.value(),
                  answer.data(),
@@ -66,7 +72,8 @@ class FakeResponder {
     }
   }
   std::vector<std::string> answers_;
-  std::vector<std::string> questions_;  // read when the search is over
+  mutable std::mutex mutex_;
+  std::vector<std::string> questions_;
   UniqueFd fd_;
   int port_ = 0;
   std::atomic<bool> stopping_{false};
