@@ -23,24 +23,6 @@ using projector::pjlink::FakeProjector;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// Class 2, and well.
-FakeProjector::Behaviour well() {
-  FakeProjector::Behaviour behaviour;
-  behaviour.replies = {{"%1CLSS ?\r", "%1CLSS=2\r"},
-                       {"%1POWR ?\r", "%1POWR=1\r"},
-                       {"%2INPT ?\r", "%2INPT=31\r"},
-                       {"%1AVMT ?\r", "%1AVMT=30\r"},
-                       {"%1ERST ?\r", "%1ERST=000000\r"},
-                       {"%1LAMP ?\r", "%1LAMP=1234 1\r"},
-                       {"%1INF1 ?\r", "%1INF1=Maker\r"},
-                       {"%1INF2 ?\r", "%1INF2=Model\r"},
-                       {"%1NAME ?\r", "%1NAME=Hall 3\r"},
-                       {"%2FREZ ?\r", "%2FREZ=0\r"},
-                       {"%2SNUM ?\r", "%2SNUM=S123\r"},
-                       {"%2SVER ?\r", "%2SVER=1.02\r"}};
-  return behaviour;
-}
-
 struct Command {
   const char* words;
   const char* request;  // without its CR
@@ -67,7 +49,7 @@ class ProjectorProgram : public testing::Test {
 };
 
 TEST_F(ProjectorProgram, SaysHowTheProjectorIs) {
-  FakeProjector::Behaviour behaviour = well();
+  FakeProjector::Behaviour behaviour = FakeProjector::well();
   behaviour.greeting = "PJLINK 1 498e4a67\r";
   FakeProjector fake(behaviour);
   ASSERT_TRUE(write_text(at("password"), "JBMIAProjectorLink\n"));
@@ -92,7 +74,7 @@ TEST_F(ProjectorProgram, SaysHowTheProjectorIs) {
 TEST_F(ProjectorProgram, EveryCommandIsSaidAsLaidDown) {
   for (const Command& command : kCommands) {
     const std::string request = std::string(command.request) + "\r";
-    FakeProjector fake(well());
+    FakeProjector fake(FakeProjector::well());
     fake.reply(request, head_of(request) + "OK\r");
     const Outcome done = projector(fake, command.words);
     ASSERT_EQ(done.exit_code, 0) << command.words << done.err;
@@ -108,7 +90,7 @@ TEST_F(ProjectorProgram, ARefusalIsExplainedAndHasItsExitCode) {
     int exit_code;
     const char* text;
   };
-  FakeProjector fake(well());
+  FakeProjector fake(FakeProjector::well());
   for (const Refusal& refusal : {Refusal{"%2INPT=ERR1\r", 1, "does not know"},
                                  Refusal{"%2INPT=ERR2\r", 2, "does not take"},
                                  Refusal{"%2INPT=ERR3\r", 1, "at present"},
@@ -122,7 +104,7 @@ TEST_F(ProjectorProgram, ARefusalIsExplainedAndHasItsExitCode) {
 }
 
 TEST_F(ProjectorProgram, WrongUsageAndNobodyThereAreTold) {
-  FakeProjector fake(well());
+  FakeProjector fake(FakeProjector::well());
   EXPECT_TRUE(fails(projector(fake, "input hdmi"), 2, "digital1"));
   EXPECT_TRUE(fails(projector(fake, "degamma-off"), 1, "own menu"));
   EXPECT_TRUE(fails(run("veneer projector status"), 2, "[control]"));
@@ -132,7 +114,7 @@ TEST_F(ProjectorProgram, WrongUsageAndNobodyThereAreTold) {
   EXPECT_TRUE(fails(projector(fake, "--password-file /dev/zero status"), 1, "first line"));
   int port = 0;
   {
-    const FakeProjector gone(well());
+    const FakeProjector gone(FakeProjector::well());
     port = gone.port();
   }
   EXPECT_TRUE(fails(
@@ -142,7 +124,7 @@ TEST_F(ProjectorProgram, WrongUsageAndNobodyThereAreTold) {
 }
 
 TEST_F(ProjectorProgram, TakesTheTableThatTheDaemonHas) {
-  FakeProjector fake(well());
+  FakeProjector fake(FakeProjector::well());
   ASSERT_TRUE(write_text(at("veneer.toml"),
                          fmt::format("scene = \"s\"\n[control]\ndriver = \"pjlink\"\n"
                                      "host = \"127.0.0.1\"\nport = {}\npoll_s = 30\n",
@@ -156,7 +138,7 @@ TEST_F(ProjectorProgram, TakesTheTableThatTheDaemonHas) {
 // A profile whose predictions are the readings, so that only the projector's state is in question.
 class VerifyOnARig : public ProjectorProgram {
  protected:
-  VerifyOnARig() : fake_(well()) {
+  VerifyOnARig() : fake_(FakeProjector::well()) {
     calibration::ProjectorProfile profile;
     profile.geometry = {64, 48, 80, 80, 32, 24, {}};
     for (auto& curve : profile.tone_curves)

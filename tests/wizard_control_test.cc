@@ -54,22 +54,9 @@ class ScriptedOperator final : public calibration::Operator {
   void say(std::string_view) override {}
 };
 
-FakeProjector::Behaviour lit_projector() {
-  FakeProjector::Behaviour behaviour;
-  behaviour.replies = {{"%1CLSS ?\r", "%1CLSS=2\r"},
-                       {"%1POWR ?\r", "%1POWR=1\r"},
-                       {"%2INPT ?\r", "%2INPT=31\r"},
-                       {"%1AVMT ?\r", "%1AVMT=30\r"},
-                       {"%1ERST ?\r", "%1ERST=000000\r"},
-                       {"%1LAMP ?\r", "%1LAMP=1234 1\r"},
-                       {"%1INF2 ?\r", "%1INF2=Model\r"},
-                       {"%2FREZ ?\r", "%2FREZ=0\r"}};
-  return behaviour;
-}
-
 class WizardControl : public testing::Test {
  protected:
-  WizardControl() : fake_(lit_projector()) {
+  WizardControl() : fake_(FakeProjector::well()) {
     options_.host = "127.0.0.1";
     options_.port = fake_.port();
     options_.time_limit = std::chrono::seconds(2);

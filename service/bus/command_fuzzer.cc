@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <climits>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <string>
 #include <string_view>
 
+#include "base/testing/law.h"
 #include "service/bus/command.h"
 
 using namespace veneer;
@@ -15,12 +14,6 @@ using namespace veneer::service;
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
 namespace {
-
-void law(bool holds, const char* what) {
-  if (holds) return;
-  std::fprintf(stderr, "broken: %s\n", what);
-  std::abort();
-}
 
 /// A daemon that is not to be troubled with nonsense.
 class StrictControl final : public ServiceControl {

@@ -1,31 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <span>
 
+#include "base/testing/law.h"
 #include "projector/control/dlpc350/dlpc350_protocol.h"
 
 using namespace veneer;
 using namespace veneer::projector;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
-
-namespace {
-
-void law(bool holds, const char* what) {
-  if (holds) return;
-  std::fprintf(stderr, "broken: %s\n", what);
-  std::abort();
-}
-
-template <class T>
-void has_text(const Result<T>& result) {
-  law(result.has_value() || !result.error().what.empty(), "a refusal without a text");
-}
-
-}  // namespace
 
 /// Reports, each a byte for its length and its bytes, to a reader of a reply; the first byte of all
 /// is the sequence number that is waited for.

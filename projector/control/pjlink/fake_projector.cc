@@ -23,6 +23,23 @@ bool is_readable(int fd) {
 
 }  // namespace
 
+FakeProjector::Behaviour FakeProjector::well() {
+  Behaviour behaviour;
+  behaviour.replies = {{"%1CLSS ?\r", "%1CLSS=2\r"},
+                       {"%1POWR ?\r", "%1POWR=1\r"},
+                       {"%2INPT ?\r", "%2INPT=31\r"},
+                       {"%1AVMT ?\r", "%1AVMT=30\r"},
+                       {"%1ERST ?\r", "%1ERST=000000\r"},
+                       {"%1LAMP ?\r", "%1LAMP=1234 1\r"},
+                       {"%1INF1 ?\r", "%1INF1=Maker\r"},
+                       {"%1INF2 ?\r", "%1INF2=Model\r"},
+                       {"%1NAME ?\r", "%1NAME=Hall 3\r"},
+                       {"%2FREZ ?\r", "%2FREZ=0\r"},
+                       {"%2SNUM ?\r", "%2SNUM=S123\r"},
+                       {"%2SVER ?\r", "%2SVER=1.02\r"}};
+  return behaviour;
+}
+
 FakeProjector::FakeProjector(Behaviour behaviour, int port) : behaviour_(std::move(behaviour)) {
   listener_ = UniqueFd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
   sockaddr_in address{};

@@ -30,6 +30,8 @@ class FakeProjector {
     /// Hangs up after so many replies on a connection; 0: never.
     int replies_a_connection = 0;
   };
+  /// Of class 2, on, and nothing wrong with it.
+  [[nodiscard]] static Behaviour well();
 
   /// @param port  0: any that is free.
   explicit FakeProjector(Behaviour behaviour, int port = 0);

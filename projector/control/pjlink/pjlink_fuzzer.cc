@@ -1,32 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <string>
 #include <string_view>
 
+#include "base/testing/law.h"
 #include "projector/control/pjlink/pjlink_protocol.h"
 
 using namespace veneer;
 using namespace veneer::projector;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
-
-namespace {
-
-void law(bool holds, const char* what) {
-  if (holds) return;
-  std::fprintf(stderr, "broken: %s\n", what);
-  std::abort();
-}
-
-template <class T>
-void has_text(const Result<T>& result) {
-  law(result.has_value() || !result.error().what.empty(), "a refusal without a text");
-}
-
-}  // namespace
 
 /// A line of any bytes, taken for everything that a line may be.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

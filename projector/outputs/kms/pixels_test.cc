@@ -85,7 +85,13 @@ TEST(WritePixels, ACodeBeyondItsBitsStaysInItsChannel) {
   }
 }
 
-TEST(WritePixels, AnEmptyPictureIsNoWork) { write_pixels({}, 8, 8, {}); }
+TEST(WritePixels, AnEmptyPictureWritesNothing) {
+  const Image<Rgb16> codes(1, 1);
+  std::uint32_t word = 17;
+  write_pixels({}, 8, 8, {});
+  write_pixels({codes.view().data(), 0, 0, 1}, 8, 8, {&word, 0, 0, 1});
+  EXPECT_EQ(word, 17U);
+}
 
 }  // namespace
 }  // namespace veneer::projector
