@@ -5,15 +5,11 @@
 
 #include <cmath>
 #include <functional>
-#include <future>
-#include <thread>
 
 #include "base/files.h"
 #include "base/image_files.h"
-#include "base/testing/temporary_folder.h"
-#include "btf/models/internal_test_models.h"
 #include "calibration/profile_store.h"
-#include "daemon/testing/fakes.h"
+#include "daemon/testing/daemon_fixture.h"
 #include "render/internal_testing.h"
 
 namespace veneer::daemon {
@@ -22,74 +18,12 @@ namespace {
 using namespace std::chrono_literals;
 using service::FaultKind;
 using service::State;
-using testing::FakeOutput;
-using testing::FakeRenderer;
-using testing::MovingTracker;
-using testing::Stagehand;
 
 /// Frames a second of the virtual runs.
 constexpr int kRate = 50;
 
-class DaemonTest : public ::testing::Test {
+class DaemonTest : public testing::DaemonFixture {
  protected:
-  static void SetUpTestSuite() {
-    folder_ = new TemporaryFolder;
-    const btf::SampleSet set = btf::testing::dichromatic_set(at("set.btfset"), false);
-    const auto material = btf::testing::fit("phong", set, {});
-    ASSERT_TRUE(material) << material.error().what;
-    ASSERT_TRUE(btf::save_material(**material, at("material.safetensors"), {}));
-    ASSERT_TRUE(calibration::ProfileStore(at("profile")).publish(render::example_profile(8, 6, 8)));
-  }
-  static void TearDownTestSuite() {
-    delete folder_;
-    folder_ = nullptr;
-  }
-  static std::filesystem::path at(const std::string& name) { return folder_->path() / name; }
-
-  void SetUp() override {
-    write_scene("300");
-    write_config("");
-  }
-  static void write_scene(const std::string& lux) {
-    ASSERT_TRUE(write_text(at("scene.toml"),
-                           "mesh = \"sphere\"\n[observer]\ntracker_body = 0\n[[light]]\nkind = "
-                           "\"directional\"\ndirection = [0, 0, 1]\nilluminance_lux = " +
-                               lux + "\n"));
-  }
-  static void write_config(const std::string& more) {
-    ASSERT_TRUE(write_text(at("veneer.toml"),
-                           "scene = \"scene.toml\"\nmaterial = \"material.safetensors\"\nprofile = "
-                           "\"profile\"\nstate_directory = \"state\"\nfirst_pose_timeout_s = 2\n" +
-                               more));
-  }
-
-  Devices devices() {
-    Devices devices;
-    devices.open_tracker = [this](Clock& clock) -> Result<std::unique_ptr<tracking::Tracker>> {
-      if (hand_.tracker_refuses || hand_.tracker_gone)
-        return fail(Errc::kNotFound, "there is no tracker");
-      ++hand_.trackers;
-      return std::make_unique<MovingTracker>(clock, clock.now() + 1ms, Time::max(), &hand_);
-    };
-    devices.open_output = [this]() -> Result<std::unique_ptr<projector::Output>> {
-      if (hand_.output_refuses) return fail(Errc::kNotFound, "there is no display");
-      ++hand_.outputs;
-      return std::make_unique<FakeOutput>(hand_);
-    };
-    devices.make_renderer = [this](const render::Scene& scene,
-                                   const btf::Material&,
-                                   const calibration::ProjectorProfile&,
-                                   const render::RendererOptions& options,
-                                   const Scanout*) -> Result<std::unique_ptr<render::Renderer>> {
-      if (hand_.renderer_refuses) return fail(Errc::kUnavailable, "there is no GPU");
-      ++hand_.renderers;
-      lux_ = std::get<render::DirectionalLight>(scene.lights.at(0)).illuminance_rgb.x();
-      return std::make_unique<FakeRenderer>(hand_, static_cast<int>(options.luminance_ceiling));
-    };
-    devices.memory_pressure = [this]() -> Result<double> { return pressure_.load(); };
-    return devices;
-  }
-
   /// Runs so many virtual frames; `direct` is asked before each.
   void run(int frames, const std::function<void(int, service::ServiceControl&)>& direct) {
     Devices fakes = devices();
@@ -154,11 +88,6 @@ class DaemonTest : public ::testing::Test {
       }
     });
   }
-
-  static inline TemporaryFolder* folder_ = nullptr;
-  Stagehand hand_;
-  std::atomic<double> lux_{0};
-  std::atomic<double> pressure_{0};
 };
 
 TEST_F(DaemonTest, ATrackerThatIsUnpluggedIsOpenedAgain) {
@@ -435,120 +364,6 @@ TEST_F(DaemonTest, ManyTroublesAtOnceEndAll) {
       EXPECT_EQ(control.status().state, State::kRunning);
     }
   });
-}
-
-// --- in real time
-
-/// Waits until `done`; false if that takes half a minute.
-bool wait_until(const std::function<bool()>& done) {
-  for (int i = 0; i < 6000 && !done(); ++i) std::this_thread::sleep_for(5ms);
-  return done();
-}
-
-class RealTimeDaemonTest : public DaemonTest {
- protected:
-  void start() {
-    auto daemon = Daemon::create(at("veneer.toml"), {"frame_rate_hz=200"}, devices());
-    ASSERT_TRUE(daemon) << daemon.error().what;
-    daemon_ = *std::move(daemon);
-    ran_ = std::async(std::launch::async, [this] {
-      SilentProgress silent;
-      return daemon_->run(stop_, silent);
-    });
-    ASSERT_TRUE(wait_until([&] { return daemon_->frames() > 10; }));
-  }
-  void end() {
-    stop_ = true;
-    const Result<Summary> summary = ran_.get();
-    ASSERT_TRUE(summary) << summary.error().what;
-    EXPECT_EQ(hand_.alive, 0);
-  }
-
-  std::atomic<bool> stop_{false};
-  std::unique_ptr<Daemon> daemon_;
-  std::future<Result<Summary>> ran_;
-};
-
-TEST_F(RealTimeDaemonTest, CallsOfManyThreadsAreServedOneAfterAnother) {
-  start();
-  std::atomic<int> served{0};
-  std::vector<std::thread> callers;
-  for (int caller = 0; caller < 4; ++caller) {
-    callers.emplace_back([&, caller] {
-      for (int i = 0; i < 5; ++i) {
-        Status status;
-        switch ((caller + i) % 5) {
-          case 0:
-            status = daemon_->set_light(0, {{0, 0, 1}, 10.0 + i, {1, 1, 1}});
-            break;
-          case 1:
-            status = daemon_->load_material(at("material.safetensors"));
-            break;
-          case 2:
-            status = daemon_->reload();
-            break;
-          case 3:
-            status = daemon_->snapshot().map([](const auto&) {});
-            break;
-          default:
-            status = daemon_->set_scene(at("scene.toml"));
-        }
-        EXPECT_TRUE(status) << status.error().what;
-        (void)daemon_->status();
-        ++served;
-      }
-    });
-  }
-  for (std::thread& caller : callers) caller.join();
-  EXPECT_EQ(served, 20);
-  // On a busy machine frames are late.
-  for (const service::Fault& fault : daemon_->status().faults)
-    EXPECT_EQ(fault.kind, FaultKind::kLate) << fault.text;
-  end();
-}
-
-TEST_F(RealTimeDaemonTest, RecoversFromALostGpuOnTheLoadersThread) {
-  start();
-  hand_.gpu_lost = true;
-  EXPECT_TRUE(wait_until([&] { return daemon_->status().recovered == 1; }));
-  EXPECT_EQ(hand_.renderers, 2);
-  EXPECT_TRUE(wait_until([&] { return daemon_->status().state == State::kRunning; }));
-  EXPECT_TRUE(wait_until([&] { return hand_.alive == 1; })) << "the old one was destroyed";
-  end();
-}
-
-TEST_F(RealTimeDaemonTest, BlankReturnsWhenItIsDark) {
-  start();
-  EXPECT_TRUE(daemon_->blank(true));
-  EXPECT_TRUE(hand_.dark);
-  const std::uint64_t frames = daemon_->frames();
-  EXPECT_TRUE(wait_until([&] { return daemon_->frames() > frames + 10; }));
-  EXPECT_TRUE(daemon_->blank(false));
-  EXPECT_FALSE(hand_.dark);
-  end();
-}
-
-TEST_F(RealTimeDaemonTest, TellsItsFiguresWhileItRuns) {
-  start();
-  EXPECT_TRUE(wait_until([&] { return daemon_->frames() > 250; }));
-  const auto status = daemon_->status();
-  EXPECT_GT(status.frame_rate_hz, 20);
-  EXPECT_LE(status.frame_rate_hz, 202);
-  EXPECT_NEAR(status.latency_ms.gpu_draw, 0.3, 1e-9);
-  EXPECT_NEAR(status.gpu_ms_median, 0.5, 1e-9);
-  EXPECT_GE(status.latency_ms.hand_off, 0);
-  EXPECT_NE(status.material.find("phong"), std::string::npos) << status.material;
-  end();
-}
-
-TEST_F(RealTimeDaemonTest, CallsBeforeAndAfterARunAreRefused) {
-  auto daemon = Daemon::create(at("veneer.toml"), {}, devices()).value();
-  EXPECT_EQ(daemon->reload().error().code, Errc::kUnavailable);
-  EXPECT_EQ(daemon->status().state, State::kStarting);
-  start();
-  end();
-  EXPECT_EQ(daemon_->reload().error().code, Errc::kUnavailable);
-  EXPECT_EQ(daemon_->snapshot().error().code, Errc::kUnavailable);
 }
 
 }  // namespace

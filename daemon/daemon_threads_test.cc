@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <future>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "daemon/daemon.h"
+#include "daemon/testing/daemon_fixture.h"
+
+namespace veneer::daemon {
+namespace {
+
+using namespace std::chrono_literals;
+using service::FaultKind;
+using service::State;
+
+/// Waits until `done`; false if that takes half a minute.
+bool wait_until(const std::function<bool()>& done) {
+  for (int i = 0; i < 6000 && !done(); ++i) std::this_thread::sleep_for(5ms);
+  return done();
+}
+
+class RealTimeDaemonTest : public testing::DaemonFixture {
+ protected:
+  void start() {
+    auto daemon = Daemon::create(at("veneer.toml"), {"frame_rate_hz=200"}, devices());
+    ASSERT_TRUE(daemon) << daemon.error().what;
+    daemon_ = *std::move(daemon);
+    ran_ = std::async(std::launch::async, [this] {
+      SilentProgress silent;
+      return daemon_->run(stop_, silent);
+    });
+    ASSERT_TRUE(wait_until([&] { return daemon_->frames() > 10; }));
+  }
+  void end() {
+    stop_ = true;
+    const Result<Summary> summary = ran_.get();
+    ASSERT_TRUE(summary) << summary.error().what;
+    EXPECT_EQ(hand_.alive, 0);
+  }
+
+  std::atomic<bool> stop_{false};
+  std::unique_ptr<Daemon> daemon_;
+  std::future<Result<Summary>> ran_;
+};
+
+TEST_F(RealTimeDaemonTest, CallsOfManyThreadsAreServedOneAfterAnother) {
+  start();
+  std::atomic<int> served{0};
+  std::vector<std::thread> callers;
+  for (int caller = 0; caller < 4; ++caller) {
+    callers.emplace_back([&, caller] {
+      for (int i = 0; i < 5; ++i) {
+        Status status;
+        switch ((caller + i) % 5) {
+          case 0:
+            status = daemon_->set_light(0, {{0, 0, 1}, 10.0 + i, {1, 1, 1}});
+            break;
+          case 1:
+            status = daemon_->load_material(at("material.safetensors"));
+            break;
+          case 2:
+            status = daemon_->reload();
+            break;
+          case 3:
+            status = daemon_->snapshot().map([](const auto&) {});
+            break;
+          default:
+            status = daemon_->set_scene(at("scene.toml"));
+        }
+        EXPECT_TRUE(status) << status.error().what;
+        (void)daemon_->status();
+        ++served;
+      }
+    });
+  }
+  for (std::thread& caller : callers) caller.join();
+  EXPECT_EQ(served, 20);
+  // On a busy machine frames are late.
+  for (const service::Fault& fault : daemon_->status().faults)
+    EXPECT_EQ(fault.kind, FaultKind::kLate) << fault.text;
+  end();
+}
+
+TEST_F(RealTimeDaemonTest, RecoversFromALostGpuOnTheLoadersThread) {
+  start();
+  hand_.gpu_lost = true;
+  EXPECT_TRUE(wait_until([&] { return daemon_->status().recovered == 1; }));
+  EXPECT_EQ(hand_.renderers, 2);
+  EXPECT_TRUE(wait_until([&] { return daemon_->status().state == State::kRunning; }));
+  EXPECT_TRUE(wait_until([&] { return hand_.alive == 1; })) << "the old one was destroyed";
+  end();
+}
+
+TEST_F(RealTimeDaemonTest, BlankReturnsWhenItIsDark) {
+  start();
+  EXPECT_TRUE(daemon_->blank(true));
+  EXPECT_TRUE(hand_.dark);
+  const std::uint64_t frames = daemon_->frames();
+  EXPECT_TRUE(wait_until([&] { return daemon_->frames() > frames + 10; }));
+  EXPECT_TRUE(daemon_->blank(false));
+  EXPECT_FALSE(hand_.dark);
+  end();
+}
+
+TEST_F(RealTimeDaemonTest, TellsItsFiguresWhileItRuns) {
+  start();
+  EXPECT_TRUE(wait_until([&] { return daemon_->frames() > 250; }));
+  const auto status = daemon_->status();
+  EXPECT_GT(status.frame_rate_hz, 20);
+  EXPECT_LE(status.frame_rate_hz, 202);
+  EXPECT_NEAR(status.latency_ms.gpu_draw, 0.3, 1e-9);
+  EXPECT_NEAR(status.gpu_ms_median, 0.5, 1e-9);
+  EXPECT_GE(status.latency_ms.hand_off, 0);
+  EXPECT_NE(status.material.find("phong"), std::string::npos) << status.material;
+  end();
+}
+
+TEST_F(RealTimeDaemonTest, CallsBeforeAndAfterARunAreRefused) {
+  auto daemon = Daemon::create(at("veneer.toml"), {}, devices()).value();
+  EXPECT_EQ(daemon->reload().error().code, Errc::kUnavailable);
+  EXPECT_EQ(daemon->status().state, State::kStarting);
+  start();
+  end();
+  EXPECT_EQ(daemon_->reload().error().code, Errc::kUnavailable);
+  EXPECT_EQ(daemon_->snapshot().error().code, Errc::kUnavailable);
+}
+
+}  // namespace
+}  // namespace veneer::daemon
