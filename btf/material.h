@@ -21,6 +21,8 @@
 
 namespace veneer::btf {
 
+struct FitRegion;
+
 /// How to fit a model; each model reads what it knows and refuses what it cannot do.
 struct FitOptions {
   /// Clusters of texels. 1 to 256.
@@ -55,6 +57,9 @@ struct FitOptions {
   /// Lloyd iterations at most, from each start and after each swap of clusters.
   int iterations = 60;
   std::uint64_t seed = 1;
+  /// What a scene can ask of the material; null: anything. Models that cannot use it fit it all.
+  /// Borrowed for the call.
+  const FitRegion* region = nullptr;
   /// Who fits: every rank calls fit() with the same set and options, and all get the whole
   /// material. More than one only where Model::over_ranks. Borrowed for the call.
   Communicator* ranks = &alone();

@@ -71,17 +71,17 @@ Result<Config> Config::read(TomlReader& toml) {
   render.read("dither", config.render.dither);
   render.read("geometry_floor", config.render.geometry_floor);
   check_range(render, "geometry_floor", config.render.geometry_floor, 1e-6, 1);
-  render.read("average_texels", config.render.average_texels);
+  render.read("average_texels", config.drawing.average_texels);
   std::string evaluation = "fragment";
   render.read("evaluation", evaluation);
   if (const auto parsed = render::parse_evaluation(evaluation)) {
-    config.render.evaluation = *parsed;
+    config.drawing.evaluation = *parsed;
   } else {
     render.add_error("evaluation", parsed.error().what);
   }
-  render.read("cache_spacing_px", config.render.cache.spacing);
-  render.read("cache_most_turn", config.render.cache.most_turn);
-  if (const Status status = config.render.cache.check(); !status) {
+  render.read("cache_spacing_px", config.drawing.cache.spacing);
+  render.read("cache_most_turn", config.drawing.cache.most_turn);
+  if (const Status status = config.drawing.cache.check(); !status) {
     render.add_error("cache_spacing_px", status.error().what);
   }
 

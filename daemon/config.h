@@ -50,6 +50,7 @@ struct Config {
   projector::ControlWatchOptions control;  ///< of the table [control], without its driver's keys
   service::FrontOptions service;
   render::RendererOptions render;
+  render::DrawingOptions drawing;  ///< of the material, in [render] too
   tracking::PredictionOptions prediction;
   tracking::PresenceOptions presence;
   tracking::ValidationOptions validation;

@@ -18,7 +18,7 @@ std::string laws_of(const Config& config) {
   if (!is_within(config.display_latency_ms, 0, 1000)) return "a latency out of range";
   if (!(config.first_pose_timeout_s > 0)) return "no time for the first pose";
   if (!is_within(config.render.geometry_floor, 1e-6, 1)) return "a geometry floor out of range";
-  if (!config.render.cache.check()) return "a cache that does not pass its check";
+  if (!config.drawing.cache.check()) return "a cache that does not pass its check";
   if (!config.prediction.check()) return "a prediction that does not pass its check";
   if (config.scene.empty() || config.material.empty() || config.profile.empty())
     return "a required path is missing";

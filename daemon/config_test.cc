@@ -38,10 +38,10 @@ TEST(Config, ReadsEveryKey) {
   EXPECT_EQ(config.frame_rate_hz, 50);
   EXPECT_FALSE(config.render.compensate);
   EXPECT_EQ(config.render.geometry_floor, 0.1);
-  EXPECT_TRUE(config.render.average_texels);
-  EXPECT_EQ(config.render.evaluation, render::Evaluation::kCompute);
-  EXPECT_EQ(config.render.cache.spacing, 16);
-  EXPECT_EQ(config.render.cache.most_turn, 0.2);
+  EXPECT_TRUE(config.drawing.average_texels);
+  EXPECT_EQ(config.drawing.evaluation, render::Evaluation::kCompute);
+  EXPECT_EQ(config.drawing.cache.spacing, 16);
+  EXPECT_EQ(config.drawing.cache.most_turn, 0.2);
   EXPECT_EQ(config.prediction.horizon_s, 0.1);
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 
 #include "base/clock.h"
 #include "base/result.h"
@@ -26,7 +27,7 @@ struct Devices {
   /// Empty where the projector cannot be asked.
   std::function<Result<std::unique_ptr<projector::ProjectorControl>>(Clock&)> open_control;
   std::function<Result<std::unique_ptr<render::Renderer>>(const render::Scene&,
-                                                          const btf::Material&,
+                                                          std::span<const render::Level>,
                                                           const calibration::ProjectorProfile&,
                                                           const render::RendererOptions&,
                                                           const Scanout*)>

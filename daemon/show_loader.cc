@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 namespace veneer::daemon {
@@ -144,15 +145,16 @@ Result<std::unique_ptr<Show>> ShowLoader::make(Script script) {
       use.reset(&scanout_users_);
     }
   }
-  auto renderer = devices_.make_renderer(
-      script.scene, *script.material, script.profile, script.config.render, scanout);
+  const std::array levels{render::Level{script.material.get(), script.config.drawing}};
+  auto renderer =
+      devices_.make_renderer(script.scene, levels, script.profile, script.config.render, scanout);
   if (!renderer && scanout != nullptr && renderer.error().code == Errc::kUnavailable) {
     spdlog::warn("the renderer cannot draw into the display's buffers, pixels are copied: {}",
                  renderer.error().what);
     use.reset();
     refused = std::exchange(scanout, nullptr);
-    renderer = devices_.make_renderer(
-        script.scene, *script.material, script.profile, script.config.render, nullptr);
+    renderer =
+        devices_.make_renderer(script.scene, levels, script.profile, script.config.render, nullptr);
   }
   if (!renderer) return tl::unexpected<Error>(std::move(renderer).error());
   auto show = std::make_unique<Show>(std::move(script), poses_, *std::move(renderer));

@@ -10,6 +10,7 @@
 
 #include "btf/material.h"
 #include "calibration/profile.h"
+#include "render/drawing.h"
 
 namespace veneer::render {
 
@@ -43,6 +44,12 @@ class ShaderMaterial : public btf::Material {
   btf::ModelShader shader_;
   btf::DirectionSet none_;
 };
+
+/// For renderers that draw in one way.
+inline std::vector<Level> one_level(const btf::Material& material,
+                                    const DrawingOptions& drawing = {}) {
+  return {{&material, drawing}};
+}
 
 /// A plausible machine: sRGB-like primaries of 200 cd/m^2 white with crosstalk, bluish black, a
 /// warm surface whose A is no diagonal, ambient light, vignetting, three different tone curves, and

@@ -222,8 +222,10 @@ class HeldRenderer : public ::testing::Test {
     Scene scene;
     scene.mesh = *load_mesh("sphere");
     scene.lights = {DirectionalLight{{0, 0, 1}, Vector3d::Constant(1000.0)}};
-    return Renderer::create(
-        scene, ShaderMaterial("return vec3(0.9, 0.6, 0.4) * light.z;"), profile, options);
+    return Renderer::create(scene,
+                            one_level(ShaderMaterial("return vec3(0.9, 0.6, 0.4) * light.z;")),
+                            profile,
+                            options);
   }
 };
 

@@ -43,11 +43,11 @@ class ProfileExchangeTest : public ::testing::Test {
     scene.mesh = *load_mesh("sphere");
     scene.lights = {DirectionalLight{Eigen::Vector3d(0.3, 0.2, 1).normalized(),
                                      Eigen::Vector3d::Constant(150.0)}};
-    auto renderer =
-        Renderer::create(scene,
-                         ShaderMaterial("return vec3(0.9, 0.5 + 0.5 * uv.y, uv.x) * light.z;"),
-                         profile,
-                         options);
+    auto renderer = Renderer::create(
+        scene,
+        one_level(ShaderMaterial("return vec3(0.9, 0.5 + 0.5 * uv.y, uv.x) * light.z;")),
+        profile,
+        options);
     if (!renderer) throw std::runtime_error(renderer.error().what);
     return std::move(*renderer);
   }

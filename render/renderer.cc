@@ -84,14 +84,16 @@ class GlRenderer final : public Renderer {
  public:
   static Result<std::unique_ptr<Renderer>> create(EglContext context,
                                                   const Scene& scene,
-                                                  const btf::Material& material,
+                                                  std::span<const Level> levels,
                                                   const PreparedProfile& prepared,
                                                   const RendererOptions& options,
                                                   const Scanout* scanout) {
     const calibration::ProjectorProfile& profile = prepared.profile();
-    const DrawOptions draw_options{.cache = options.cache,
-                                   .filter = texel_filter(material, options.average_texels),
-                                   .evaluation = options.evaluation};
+    const btf::Material& material = *levels.front().material;
+    const DrawingOptions& drawing = levels.front().drawing;
+    const DrawOptions draw_options{.cache = drawing.cache,
+                                   .filter = texel_filter(material, drawing.average_texels),
+                                   .evaluation = drawing.evaluation};
     VENEER_ASSIGN(
         DrawPass draw,
         DrawPass::create(
@@ -258,7 +260,7 @@ class GlRenderer final : public Renderer {
 }  // namespace
 
 Result<std::unique_ptr<Renderer>> Renderer::create(const Scene& scene,
-                                                   const btf::Material& material,
+                                                   std::span<const Level> levels,
                                                    const calibration::ProjectorProfile& profile,
                                                    const RendererOptions& options,
                                                    const Scanout* scanout) {
@@ -273,7 +275,7 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const Scene& scene,
   VENEER_ASSIGN(
       EglContext context,
       scanout != nullptr ? EglContext::create_on(scanout->gbm_device) : EglContext::create());
-  return GlRenderer::create(std::move(context), scene, material, *prepared, options, scanout);
+  return GlRenderer::create(std::move(context), scene, levels, *prepared, options, scanout);
 }
 
 }  // namespace veneer::render

@@ -6,16 +6,15 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "base/image.h"
 #include "base/result.h"
 #include "base/rigid_transform.h"
 #include "base/scanout.h"
-#include "btf/material.h"
 #include "calibration/profile.h"
-#include "render/angular_cache_options.h"
-#include "render/evaluation.h"
+#include "render/drawing.h"
 #include "render/scene.h"
 
 namespace veneer::render {
@@ -29,13 +28,6 @@ struct RendererOptions {
   bool dither = true;
   /// Below this G a point is out of the projector's reach and stays black. > 0.
   double geometry_floor = 0.05;
-  AngularCacheOptions cache{};
-  /// Each pixel shows the mean of the texels under it, up to two along each side, in place of the
-  /// texel at its centre: four evaluations, and no jagged edges between texels. Of materials with
-  /// mip levels either is done on the level that suits the pixel's size.
-  bool average_texels = false;
-  /// Compute goes without the angular cache.
-  Evaluation evaluation = Evaluation::kFragment;
   /// Profiles will be exchanged while frames are drawn: what another one may need is compiled at
   /// the start.
   bool exchangeable = false;
@@ -54,6 +46,13 @@ struct FrameInput {
   /// left. Highlights tell a wrong eye at once, so they can go while nobody knows where it is.
   /// Does nothing to materials without Material::has_specular_term().
   double specular_weight = 1.0;
+  /// Which of the renderer's levels is drawn.
+  std::size_t level = 0;
+  /// The one that takes its place, and how much of the picture is already its own: 0, none, to 1,
+  /// all. In between, parts of the picture go over one after another, so that a frame costs between
+  /// the one level and the other, and nothing is seen to jump.
+  std::size_t next_level = 0;
+  double fade = 0.0;
 };
 
 /// What one frame did, read without waiting for the GPU (so it may be of an earlier frame).
@@ -76,13 +75,14 @@ struct FrameStatistics {
 /// the next that calls anything.
 class Renderer {
  public:
+  /// @param levels  at least one; all materials stay on the GPU.
   /// @param scanout  the display's buffers, if draw_to_scanout() will be called; borrowed, must
   /// outlive the renderer.
   /// Errors: kUnavailable (no EGL, no GL 4.5, buffers that cannot be imported; says what there is),
   /// kBadFormat, kInvalidOption (also buffers of another size or of fewer bits than the profile).
   [[nodiscard]] static Result<std::unique_ptr<Renderer>> create(
       const Scene& scene,
-      const btf::Material& material,
+      std::span<const Level> levels,
       const calibration::ProjectorProfile& profile,
       const RendererOptions& options,
       const Scanout* scanout = nullptr);

@@ -42,8 +42,11 @@ TEST(RendererAllocation, AFrameDoesNotAllocateOnceWarm) {
   scene.mesh = *load_mesh("sphere");
   scene.lights = {DirectionalLight{}, PointLight{}};
   const auto profile = example_profile(64, 48, 8);
-  const auto renderer = Renderer::create(
-      scene, ShaderMaterial("return vec3(view.z * light.z);"), profile, {.luminance_ceiling = 1.0});
+  const auto renderer =
+      Renderer::create(scene,
+                       one_level(ShaderMaterial("return vec3(view.z * light.z);")),
+                       profile,
+                       {.luminance_ceiling = 1.0});
   ASSERT_TRUE(renderer) << renderer.error().what;
   FrameInput input{{0, 0, 1}, {}, 0};
   const auto draw = [&](int frames) {

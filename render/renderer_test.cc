@@ -88,8 +88,9 @@ class RendererTest : public ::testing::Test {
 
   [[nodiscard]] std::unique_ptr<Renderer> make(const Scene& scene,
                                                const btf::Material& material,
+                                               const DrawingOptions& drawing = {},
                                                const RendererOptions& options = {}) const {
-    auto renderer = Renderer::create(scene, material, profile_, options);
+    auto renderer = Renderer::create(scene, one_level(material, drawing), profile_, options);
     if (!renderer) throw std::runtime_error(renderer.error().what);
     return std::move(*renderer);
   }
@@ -239,9 +240,10 @@ TEST_F(RendererTest, FadesTheSpecularTerm) {
 TEST_F(RendererTest, RefusesTheAngularCacheInAComputePass) {
   const auto renderer =
       Renderer::create(plate_scene(),
-                       ShaderMaterial("return vec3(1.0);"),
+                       one_level(ShaderMaterial("return vec3(1.0);"),
+                                 {.cache = {.spacing = 16}, .evaluation = Evaluation::kCompute}),
                        profile_,
-                       {.cache = {.spacing = 16}, .evaluation = Evaluation::kCompute});
+                       {});
   ASSERT_FALSE(renderer);
   EXPECT_EQ(renderer.error().code, Errc::kInvalidOption);
   EXPECT_EQ(parse_evaluation("compute"), Evaluation::kCompute);
@@ -406,7 +408,7 @@ TEST_F(RendererTest, CodesSendTheTarget) {
     Scene scene = plate_scene();
     scene.lights = {DirectionalLight{Vector3d::UnitZ(), Vector3d::Constant(60 * kPi)}};
     const auto renderer =
-        make(scene, ShaderMaterial("return vec3(0.4 + 0.4 * uv, 0.6);"), {.dither = false});
+        make(scene, ShaderMaterial("return vec3(0.4 + 0.4 * uv, 0.6);"), {}, {.dither = false});
     const FrameInput input = tilted_frame();
     renderer->draw(input);
     Image<Rgb32f> target(kWidth, kHeight);
@@ -471,7 +473,7 @@ TEST_F(RendererTest, CountsWhatIsOutOfGamutAndOutOfReach) {
   EXPECT_GT(bright->statistics().covered_pixels, 0U);
   EXPECT_EQ(bright->statistics().out_of_gamut_pixels, bright->statistics().covered_pixels);
   EXPECT_GT(bright->statistics().gamut_loss_mean, 1.0);
-  const auto far = make(scene, white, {.geometry_floor = 50.0});
+  const auto far = make(scene, white, {}, {.geometry_floor = 50.0});
   far->draw(tilted_frame());
   far->finish();
   EXPECT_EQ(far->statistics().out_of_reach_pixels, far->statistics().covered_pixels);
@@ -587,7 +589,7 @@ TEST_F(RendererTest, RefusesWhatItCannotDraw) {
   const ShaderMaterial white("return vec3(1.0);");
   const auto refused =
       [&](const Scene& scene, const btf::Material& material, const RendererOptions& options) {
-        const auto renderer = Renderer::create(scene, material, profile_, options);
+        const auto renderer = Renderer::create(scene, one_level(material), profile_, options);
         return renderer ? std::string() : renderer.error().what;
       };
   EXPECT_NE(refused(plate_scene(), white, {.geometry_floor = 0}).find("geometry_floor"),

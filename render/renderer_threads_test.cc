@@ -30,7 +30,9 @@ class RendererThreadsTest : public ::testing::Test {
   }
 
   // @param which  which of two materials and profiles.
-  static std::unique_ptr<Renderer> make(int which, const RendererOptions& options = {}) {
+  static std::unique_ptr<Renderer> make(int which,
+                                        const RendererOptions& options = {},
+                                        const DrawingOptions& drawing = {}) {
     Scene scene;
     scene.mesh = *load_mesh("sphere");
     scene.lights = {DirectionalLight{Eigen::Vector3d(0.3, 0.2, 1).normalized(),
@@ -40,7 +42,7 @@ class RendererThreadsTest : public ::testing::Test {
     const ShaderMaterial material(which == 0
                                       ? "return vec3(0.9, 0.5 + 0.5 * uv.y, uv.x) * light.z;"
                                       : "return vec3(uv, 0.3) * max(light.z * view.z, 0.0);");
-    auto renderer = Renderer::create(scene, material, profile, options);
+    auto renderer = Renderer::create(scene, one_level(material, drawing), profile, options);
     if (!renderer) throw std::runtime_error(renderer.error().what);
     return std::move(*renderer);
   }
@@ -63,11 +65,12 @@ class RendererThreadsTest : public ::testing::Test {
 TEST_F(RendererThreadsTest, HandedOverItDrawsWhatOneMadeInPlaceDraws) {
   for (const int which : {0, 1})
     for (const Evaluation evaluation : {Evaluation::kFragment, Evaluation::kCompute}) {
-      const RendererOptions options{.evaluation = evaluation, .exchangeable = true};
-      const auto wanted = frames(*make(which, options), 0, 3);
+      const RendererOptions options{.exchangeable = true};
+      const DrawingOptions drawing{.evaluation = evaluation};
+      const auto wanted = frames(*make(which, options, drawing), 0, 3);
       std::unique_ptr<Renderer> renderer;
       on_a_thread([&] {
-        renderer = make(which, options);
+        renderer = make(which, options, drawing);
         renderer->release();
       });
       EXPECT_FALSE(renderer->lost());

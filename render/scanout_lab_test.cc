@@ -60,11 +60,12 @@ class ScanoutLab : public ::testing::Test {
     scene.mesh = *load_mesh("sphere");
     scene.lights = {DirectionalLight{Eigen::Vector3d(0.3, 0.2, 1).normalized(),
                                      Eigen::Vector3d::Constant(150.0)}};
-    return Renderer::create(scene,
-                            ShaderMaterial("return vec3(0.9, 0.5 + 0.5 * uv.y, uv.x) * light.z;"),
-                            example_profile(width, kHeight, bits),
-                            {},
-                            &scanout_);
+    return Renderer::create(
+        scene,
+        one_level(ShaderMaterial("return vec3(0.9, 0.5 + 0.5 * uv.y, uv.x) * light.z;")),
+        example_profile(width, kHeight, bits),
+        {},
+        &scanout_);
   }
 
   // What the display would scan out of a buffer: row after row, from the first in memory.

@@ -34,6 +34,36 @@ constexpr std::string_view kNear = "must be finite, and from -1000 to 1000 metre
 // A finite value in [0, kMaxLight].
 bool is_amount_of_light(double value) { return value >= 0.0 && value <= kMaxLight; }
 
+constexpr double kMostElevation_deg = 90.0;
+constexpr double kMostTurn_deg = 360.0;
+
+std::optional<Region> read_region(TomlReader& parent) {
+  if (!parent.contains("region")) return std::nullopt;
+  TomlReader toml = parent.table("region");
+  Region region;
+  toml.read("centre", region.centre);
+  if (!is_near(region.centre)) toml.add_error("centre", kNear);
+  toml.read("radius_m", region.radius);
+  if (!(region.radius.x() > 0.0 && region.radius.x() <= region.radius.y() &&
+        region.radius.y() <= kMostMetres))
+    toml.add_error("radius_m", "must be two numbers above 0, ascending, at most 1000");
+  const auto read_angles = [&](std::string_view key, Eigen::Vector2d& angles) {
+    Eigen::Vector2d deg = Eigen::Vector2d::Zero();
+    toml.read(key, deg);
+    angles = {to_radians(Degrees{deg.x()}).value, to_radians(Degrees{deg.y()}).value};
+    return deg;
+  };
+  const Eigen::Vector2d azimuth = read_angles("azimuth_deg", region.azimuth);
+  if (!(azimuth.cwiseAbs().maxCoeff() <= kMostTurn_deg && azimuth.x() <= azimuth.y() &&
+        azimuth.y() - azimuth.x() <= kMostTurn_deg))
+    toml.add_error("azimuth_deg",
+                   "must be two angles within -360 to 360, ascending, at most 360 apart");
+  const Eigen::Vector2d elevation = read_angles("elevation_deg", region.elevation);
+  if (!(elevation.cwiseAbs().maxCoeff() <= kMostElevation_deg && elevation.x() <= elevation.y()))
+    toml.add_error("elevation_deg", "must be two angles within -90 to 90, ascending");
+  return region;
+}
+
 Light read_light(TomlReader& toml) {
   std::string kind = "directional";
   toml.read("kind", kind);
@@ -146,9 +176,22 @@ void read_observer(TomlReader toml, Scene& scene) {
     if (body < 0) toml.add_error(key, "must be bodies' numbers, 0 or more");
   }
   scene.eye_in_sensor = read_eye(toml);
+  scene.observer_region = read_region(toml);
 }
 
 }  // namespace
+
+Eigen::Vector3d point_in(const Region& region, const Eigen::Vector3d& at) {
+  const auto between = [](const Eigen::Vector2d& ends, double t) {
+    return ends.x() + t * (ends.y() - ends.x());
+  };
+  const double azimuth = between(region.azimuth, at.x());
+  const Eigen::Vector2d heights(std::sin(region.elevation.x()), std::sin(region.elevation.y()));
+  const double height = std::clamp(between(heights, at.y()), -1.0, 1.0);
+  const double level = std::sqrt(1.0 - height * height);
+  const Eigen::Vector3d direction(level * std::sin(azimuth), height, level * std::cos(azimuth));
+  return region.centre + between(region.radius, at.z()) * direction;
+}
 
 Result<Scene> Scene::load(const std::filesystem::path& path) {
   VENEER_ASSIGN(TomlReader toml, TomlReader::open(path));
@@ -160,7 +203,10 @@ Result<Scene> Scene::load(const std::filesystem::path& path) {
     toml.add_error("texture_repeats", "both must be above 0 and at most 1000");
   read_object(toml.table("object"), scene);
   read_observer(toml.table("observer"), scene);
-  for (TomlReader& light : toml.tables("light")) scene.lights.push_back(read_light(light));
+  for (TomlReader& light : toml.tables("light")) {
+    scene.lights.push_back(read_light(light));
+    scene.light_regions.push_back(read_region(light));
+  }
   if (scene.lights.empty() || scene.lights.size() > kMaxLights)
     toml.add_error(
         "light",

@@ -46,6 +46,11 @@ tracker_body = 2
 [observer]
 tracker_body = 1
 eye_in_sensor = [0.01, 0.02, 0.03]
+[observer.region]
+centre = [0, 1, 0]
+radius_m = [0.5, 2]
+azimuth_deg = [-90, 180]
+elevation_deg = [-30, 90]
 [[light]]
 kind = "directional"
 direction = [0, 0, 2]
@@ -55,6 +60,8 @@ colour = [1, 0.5, 0]
 kind = "point"
 position = [0, 1, 0]
 intensity_cd = 10
+[light.region]
+radius_m = [3, 3]
 )");
   ASSERT_TRUE(scene) << scene.error().what;
   EXPECT_EQ(scene->texture_repeats, Eigen::Vector2d(6, 3));
@@ -156,6 +163,43 @@ TEST_F(SceneTest, SaysThatTheMeshIsMissing) {
   EXPECT_EQ(scene.error().code, Errc::kNotFound);
   EXPECT_NE(scene.error().what.find("teapot.obj"), std::string::npos);
   EXPECT_EQ(Scene::load(folder_.path() / "no.toml").error().code, Errc::kNotFound);
+}
+
+TEST_F(SceneTest, RegionsAreThickSpheresParts) {
+  const Region region{{0, 1, 0},
+                      {0.5, 2.0},
+                      {-std::numbers::pi / 2, std::numbers::pi},
+                      {-std::numbers::pi / 6, std::numbers::pi / 2}};
+  const auto scene =
+      load(std::string("mesh = \"plate\"\n[observer.region]\ncentre = [0, 1, 0]\n") +
+           "radius_m = [0.5, 2]\nazimuth_deg = [-90, 180]\nelevation_deg = [-30, 90]\n" + kLight +
+           kLight + "[light.region]\nradius_m = [3, 3]\n");
+  ASSERT_TRUE(scene) << scene.error().what;
+  ASSERT_TRUE(scene->observer_region);
+  constexpr double kRounding = 1e-12;
+  for (const Vector3d& at : {Vector3d(0, 0, 0), Vector3d(1, 1, 1), Vector3d(0.3, 0.5, 0.7)})
+    EXPECT_LE((point_in(*scene->observer_region, at) - point_in(region, at)).norm(), kRounding);
+  ASSERT_EQ(scene->light_regions.size(), 2U);
+  EXPECT_FALSE(scene->light_regions[0]);
+  EXPECT_TRUE(scene->light_regions[1]);
+  // The ends: -90 degrees is -x, elevation 90 degrees is +y.
+  EXPECT_LE((point_in(region, {0, 0, 0}) -
+             Vector3d(-0.5 * std::cos(std::numbers::pi / 6), 1.0 - 0.25, 0.0))
+                .norm(),
+            kRounding);
+  EXPECT_LE((point_in(region, {0.5, 1, 1}) - Vector3d(0, 3, 0)).norm(), kRounding);
+}
+
+TEST_F(SceneTest, RefusesRegionsThatAreNone) {
+  const std::string scene = std::string("mesh = \"plate\"\n") + "[observer.region]\n";
+  const std::string light = kLight;
+  expect_refused(scene + "radius_m = [2, 1]\n" + light, {"radius_m", "ascending"});
+  expect_refused(scene + "radius_m = [0, 1]\n" + light, {"radius_m", "above 0"});
+  expect_refused(scene + "azimuth_deg = [-200, 200]\n" + light, {"azimuth_deg", "apart"});
+  expect_refused(scene + "elevation_deg = [0, 91]\n" + light, {"elevation_deg", "90"});
+  expect_refused(scene + "elevation_deg = [nan, 1]\n" + light, {"elevation_deg"});
+  expect_refused(scene + "centre = [0, 0, inf]\n" + light, {"centre"});
+  expect_refused(scene + "azimuth = [0, 1]\n" + light, {"azimuth", "azimuth_deg"});
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nlohmann/json.hpp>
 
+#include <array>
+
 #include "base/exit_code.h"
 #include "base/image_files.h"
 #include "btf/material.h"
@@ -17,6 +19,7 @@ Result<int> run_render(CommandLine& line) {
   std::filesystem::path out;
   std::vector<double> eye{0, 0, 1};
   render::RendererOptions options;
+  render::DrawingOptions drawing;
   bool uncompensated = false;
   std::string evaluation = "fragment";
   CLI::App& app = line.app();
@@ -31,27 +34,31 @@ Result<int> run_render(CommandLine& line) {
   app.add_flag(
       "--uncompensated", uncompensated, "Send the target as if projector and surface were ideal");
   app.add_flag("--average-texels",
-               options.average_texels,
+               drawing.average_texels,
                "Show the mean of the texels under a pixel, not the one at its centre");
   app.add_option("--evaluation",
                  evaluation,
                  "Where the material is evaluated: fragment, or compute over the visible pixels")
       ->capture_default_str();
   app.add_option("--cache",
-                 options.cache.spacing,
+                 drawing.cache.spacing,
                  "Pixels between the nodes of the angular cache; 0 draws every pixel by itself")
       ->capture_default_str();
   app.add_option("--cache-turn",
-                 options.cache.most_turn,
+                 drawing.cache.most_turn,
                  "The most that directions may turn between nodes, about radians")
+      ->capture_default_str();
+  app.add_option("--scale",
+                 drawing.scale,
+                 "Draw on a raster this much smaller than the projector's, 0.25 to 1")
       ->capture_default_str();
   app.add_option("-o,--output",
                  out,
                  "frame.png: the drive codes; frame.exr: the luminance aimed at, XYZ in cd/m^2")
       ->required();
   line.parse();
-  VENEER_TRY(options.cache.check());
-  VENEER_ASSIGN(options.evaluation, render::parse_evaluation(evaluation));
+  VENEER_ASSIGN(drawing.evaluation, render::parse_evaluation(evaluation));
+  VENEER_TRY(drawing.check());
   if (out.extension() != ".png" && out.extension() != ".exr") {
     return fail(
         Errc::kInvalidOption, "writing {}: the name must end in .png or .exr", out.string());
@@ -63,7 +70,8 @@ Result<int> run_render(CommandLine& line) {
                 calibration::ProjectorProfile::load(profile_path));
   options.compensate = !uncompensated;
   VENEER_ASSIGN(const std::unique_ptr<render::Renderer> renderer,
-                render::Renderer::create(scene, *material, profile, options));
+                render::Renderer::create(
+                    scene, std::array{render::Level{material.get(), drawing}}, profile, options));
   renderer->draw({Eigen::Vector3d(eye[0], eye[1], eye[2]), scene.world_from_object, 0});
   renderer->finish();
   const int width = profile.geometry.width;

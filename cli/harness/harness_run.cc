@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -138,7 +139,9 @@ Status add_pictures(const Scenario& scenario,
                     Progress& progress) {
   VENEER_ASSIGN(const auto profile, calibration::ProjectorProfile::load(profile_path));
   VENEER_ASSIGN(const auto material, btf::load_material(material_path));
-  VENEER_ASSIGN(const auto renderer, render::Renderer::create(scene, *material, profile, {}));
+  VENEER_ASSIGN(
+      const auto renderer,
+      render::Renderer::create(scene, std::array{render::Level{material.get()}}, profile, {}));
   const Xyz white = profile.emitted(Eigen::Vector3d::Ones());
   Image<Rgb32f> right(profile.geometry.width, profile.geometry.height);
   std::vector<double>& differences = run.quantities["picture_de00"];

@@ -66,7 +66,7 @@ class DaemonFixture : public ::testing::Test {
       return std::make_unique<FakeOutput>(hand_);
     };
     devices.make_renderer = [this](const render::Scene& scene,
-                                   const btf::Material&,
+                                   std::span<const render::Level>,
                                    const calibration::ProjectorProfile&,
                                    const render::RendererOptions& options,
                                    const Scanout*) -> Result<std::unique_ptr<render::Renderer>> {

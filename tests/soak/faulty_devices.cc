@@ -210,13 +210,13 @@ daemon::Devices faulty_devices(const std::filesystem::path& config,
   };
   devices.make_renderer = [&switches, &laws, &clock](
                               const render::Scene& scene,
-                              const btf::Material& material,
+                              std::span<const render::Level> levels,
                               const calibration::ProjectorProfile& profile,
                               const render::RendererOptions& options,
                               const Scanout* scanout) -> Result<std::unique_ptr<render::Renderer>> {
     if (switches.met(Injection::kGpuRefusesToOpen))
       return fail(Errc::kUnavailable, "opening the GPU: its driver is being loaded");
-    VENEER_ASSIGN(auto inner, render::Renderer::create(scene, material, profile, options, scanout));
+    VENEER_ASSIGN(auto inner, render::Renderer::create(scene, levels, profile, options, scanout));
     ++laws.renderers;
     return std::make_unique<FaultyRenderer>(std::move(inner), switches, laws, clock);
   };

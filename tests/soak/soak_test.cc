@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstdlib>
 
 #include "render/renderer.h"
@@ -26,7 +27,8 @@ std::string no_gl() {
   const auto scene = render::Scene::load((*stage)->scene());
   const auto material = btf::load_material((*stage)->material());
   if (!scene || !material) return "the stage's own files cannot be read";
-  const auto renderer = render::Renderer::create(*scene, **material, (*stage)->good_profile(), {});
+  const auto renderer = render::Renderer::create(
+      *scene, std::array{render::Level{material->get()}}, (*stage)->good_profile(), {});
   return renderer ? std::string{} : renderer.error().what;
 }
 
