@@ -170,6 +170,8 @@ TEST_F(DaemonOnTheBus, SurvivesUnplugReplugAndAnotherDevicesArrivalAndSaysSo) {
     ASSERT_TRUE(daemon.runs());
     liberty.plug();
     ASSERT_TRUE(flows(liberty)) << daemon.log();
+    ASSERT_TRUE(wait_until([&] { return daemon.log().find("running") != std::string::npos; }));
+    std::this_thread::sleep_for(kRecovery);  // the rasteriser's threads come with the first frames
     const std::size_t descriptors = daemon.descriptors();
     const std::size_t threads = daemon.threads();
     UsbDevice mouse({0x046d, 0xc077, "Mouse", "", "1-4", {{0x81, true}}});
@@ -205,17 +207,9 @@ TEST_F(DaemonOnTheBus, SurvivesTenThousandFaultsWithoutALeak) {
     std::size_t descriptors = 0;
     std::size_t threads = 0;
     double resident_mib = 0;
-    int replugs = 0;
     for (int i = 0; i < kFaults; ++i) {
-      // A fault is one only while somebody listens. Once in some ten thousand openings the mocked
-      // node cannot be reached for good ("Failed to connect to ioctl socket"), and the daemon asks
-      // for what a person does then.
+      // A fault is one only while somebody listens.
       const auto listens = [&liberty] { return liberty.usb().in_flight() > 0; };
-      if (!wait_until(listens, seconds(10))) {
-        ++replugs;
-        liberty.unplug();
-        liberty.plug();
-      }
       ASSERT_TRUE(wait_until(listens)) << "after fault " << i << "\n" << daemon.log();
       inject_random_fault(random, liberty);
       std::this_thread::sleep_for(milliseconds(1));
@@ -225,7 +219,6 @@ TEST_F(DaemonOnTheBus, SurvivesTenThousandFaultsWithoutALeak) {
       threads = daemon.threads();
       resident_mib = daemon.resident_mib();
     }
-    EXPECT_LE(replugs, 3);
     EXPECT_TRUE(flows(liberty)) << daemon.log();
     EXPECT_EQ(daemon.descriptors(), descriptors);
     EXPECT_EQ(daemon.threads(), threads);

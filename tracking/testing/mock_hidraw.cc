@@ -111,8 +111,8 @@ void HidrawDevice::plug() {
                           description_.product,
                           number);
   Bus& bus = Bus::instance();
+  bus.attach(node_, handler_);  // before there is a node to open: see UsbDevice::plug()
   bus.add(description_text());
-  bus.attach(node_, handler_);
   {
     const std::lock_guard lock(mutex_);
     plugged_ = true;

@@ -154,9 +154,11 @@ void UsbDevice::plug() {
     packets_.clear();
   }
   Bus& bus = Bus::instance();
-  bus.add(description_text());
+  // In this order: umockdev ends a program that opens a node whose socket is bound and does not yet
+  // listen, and what is not there cannot be opened.
   bus.attach(node(), handler_);
   attached_ = true;
+  bus.add(description_text());
   bus.announce(syspath(), "add");
 }
 
