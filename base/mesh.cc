@@ -174,6 +174,22 @@ Status check_ply_header(const std::string& path) {
       path);
 }
 
+/// assimp 5.2.5 ends the program where it is to make triangles of faces without corners.
+Status check_faces(const aiScene& scene, const std::string& origin) {
+  for (unsigned i = 0; i < scene.mNumMeshes; ++i) {
+    const aiMesh& part = *scene.mMeshes[i];
+    for (unsigned k = 0; k < part.mNumFaces; ++k) {
+      if (part.mFaces[k].mNumIndices == 0)
+        return fail(Errc::kBadFormat,
+                    "reading the mesh {}: face {} of \"{}\" has no corners; export it again",
+                    origin,
+                    k,
+                    part.mName.C_Str());
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<Mesh> load_mesh(const std::filesystem::path& path_or_name) {
@@ -203,10 +219,14 @@ Result<Mesh> load_mesh(const std::filesystem::path& path_or_name) {
                 origin);
   // FlipUVs: files count v from the bottom of the texture, Veneer from its first row. SortByPType:
   // points and lines become parts of their own, which may lack texture coordinates and normals.
-  const aiScene* scene = importer.ReadFile(
-      origin,
-      aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_GenSmoothNormals |
-          aiProcess_JoinIdenticalVertices | aiProcess_PreTransformVertices | aiProcess_FlipUVs);
+  const aiScene* scene = importer.ReadFile(origin, 0);
+  if (scene != nullptr) VENEER_TRY(check_faces(*scene, origin));
+  scene = scene == nullptr
+              ? nullptr
+              : importer.ApplyPostProcessing(aiProcess_Triangulate | aiProcess_SortByPType |
+                                             aiProcess_GenSmoothNormals |
+                                             aiProcess_JoinIdenticalVertices |
+                                             aiProcess_PreTransformVertices | aiProcess_FlipUVs);
   if (scene == nullptr)
     return fail(Errc::kBadFormat, "reading the mesh {}: {}", origin, importer.GetErrorString());
   Mesh mesh;

@@ -122,6 +122,21 @@ TEST(LoadMesh, RefusesAPlyFileWhoseHeaderDoesNotEnd) {
     }
 }
 
+// assimp would end the program.
+TEST(LoadMesh, RefusesFacesWithoutCorners) {
+  const TemporaryFolder folder;
+  const auto path = folder.path() / "a.ply";
+  ASSERT_TRUE(write_text(path,
+                         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
+                         "property float y\nproperty float z\nelement face 1\n"
+                         "property list uchar int vertex_indices\nend_header\n"
+                         "0 0 0\n1 0 0\n0 1 0\n0\n"));
+  const auto mesh = load_mesh(path);
+  ASSERT_FALSE(mesh);
+  EXPECT_EQ(mesh.error().code, Errc::kBadFormat);
+  EXPECT_NE(mesh.error().what.find("no corners"), std::string::npos) << mesh.error().what;
+}
+
 TEST(LoadMesh, ReadsAPlyFileHoweverItsLinesEnd) {
   const TemporaryFolder folder;
   const std::string text =

@@ -12,7 +12,7 @@ namespace veneer::manual {
 namespace {
 
 /// Single quotes as bash and zsh read them.
-std::string quoted(std::string_view text) {
+std::string in_quotes(std::string_view text) {
   std::string out = "'";
   for (const char c : text) {
     if (c == '\'') {
@@ -101,12 +101,12 @@ std::string value_cases(const std::vector<Place>& places) {
       for (const std::string& name : option->names) {
         if (std::ranges::find(seen, name) != seen.end()) continue;
         seen.push_back(name);
-        patterns += (patterns.empty() ? "" : " | ") + quoted(place.path + " " + name);
+        patterns += (patterns.empty() ? "" : " | ") + in_quotes(place.path + " " + name);
       }
       if (patterns.empty()) continue;
       text += fmt::format("    {}) values={} ;;\n",
                           patterns,
-                          quoted(fmt::format("{}", fmt::join(option->choices, " "))));
+                          in_quotes(fmt::format("{}", fmt::join(option->choices, " "))));
     }
   }
   return text;
@@ -115,7 +115,7 @@ std::string value_cases(const std::vector<Place>& places) {
 std::string path_patterns(const std::vector<Place>& places) {
   std::vector<std::string> paths;
   for (const Place& place : places) {
-    if (!place.path.empty()) paths.push_back(quoted(place.path));
+    if (!place.path.empty()) paths.push_back(in_quotes(place.path));
   }
   return fmt::format("{}", fmt::join(paths, " | "));
 }
@@ -154,8 +154,8 @@ std::string bash_completion(const Usage& usage) {
     std::vector<std::string> words;
     for (const Word& each : words_at(place)) words.push_back(each.word);
     text += fmt::format("    {}) values={} ;;\n",
-                        quoted(place.path),
-                        quoted(fmt::format("{}", fmt::join(words, " "))));
+                        in_quotes(place.path),
+                        in_quotes(fmt::format("{}", fmt::join(words, " "))));
   }
   return text + fmt::format(
                     "  esac\n  COMPREPLY=($(compgen -W \"$values\" -- \"$current\"))\n}}\n"
@@ -180,12 +180,12 @@ std::string zsh_completion(const Usage& usage) {
           "if [[ -z $values ]]; then\n  _files\n  return\nelif [[ $values != unasked ]]; then\n"
           "  compadd -- ${=values}\n  return\nfi\ncase \"$place\" in\n";
   for (const Place& place : places) {
-    text += fmt::format("  {}) offered=(\n", quoted(place.path));
+    text += fmt::format("  {}) offered=(\n", in_quotes(place.path));
     for (const Word& each : words_at(place)) {
       std::string word = each.word;
       if (const std::size_t colon = word.find(':'); colon != std::string::npos)
         word.insert(colon, "\\");
-      text += "    " + quoted(word + ":" + each.text) + "\n";
+      text += "    " + in_quotes(word + ":" + each.text) + "\n";
     }
     text += "  ) ;;\n";
   }
