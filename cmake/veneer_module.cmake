@@ -12,6 +12,8 @@ if(CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   target_compile_options(veneer_options INTERFACE -march=x86-64-v3)
 endif()
 
+include(precompiled)
+
 # Every test program, so that a sanitizer build can ask for these alone.
 add_custom_target(veneer_tests)
 
@@ -24,6 +26,7 @@ function(veneer_add_test name)
   add_executable(veneer_${name}_test ${T_SRCS})
   target_link_libraries(veneer_${name}_test PRIVATE ${T_DEPS} GTest::gtest GTest::gmock
                                                     GTest::gtest_main)
+  veneer_use_precompiled(veneer_${name}_test veneer_precompiled_tests)
   add_dependencies(veneer_tests veneer_${name}_test)
   add_test(NAME ${name} COMMAND veneer_${name}_test)
   # Real measured data; tests that need it skip, saying so, where it is absent.
@@ -48,6 +51,7 @@ function(veneer_add_bus_test name)
   cmake_parse_arguments(B "" "" "SRCS;DEPS" ${ARGN})
   add_executable(veneer_${name}_test ${B_SRCS})
   target_link_libraries(veneer_${name}_test PRIVATE ${B_DEPS} veneer_mock_bus)
+  veneer_use_precompiled(veneer_${name}_test veneer_precompiled_tests)
   add_dependencies(veneer_tests veneer_${name}_test)
   add_test(NAME ${name} COMMAND ${UMOCKDEV_WRAPPER} $<TARGET_FILE:veneer_${name}_test>)
   set_tests_properties(${name} PROPERTIES
@@ -83,6 +87,7 @@ function(veneer_add_module name)
   add_library(veneer_${name} STATIC ${M_SRCS})
   add_library(veneer::${name} ALIAS veneer_${name})
   target_link_libraries(veneer_${name} PUBLIC veneer_options ${M_DEPS} PRIVATE ${M_PRIVATE_DEPS})
+  veneer_use_precompiled(veneer_${name} veneer_precompiled)
   foreach(dep IN LISTS M_DEPS M_PRIVATE_DEPS)
     # The floors are added lowest first, so what is not there yet is above (or misspelt).
     if(dep MATCHES "^veneer::" AND NOT TARGET ${dep})
