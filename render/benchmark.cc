@@ -236,7 +236,7 @@ class Bench {
   double texels_per_pixel_;
   calibration::ProjectorProfile profile_;
   MeshBuffers mesh_;
-  DrawTarget target_;
+  TimedTarget target_;
   std::vector<Entrant> entrants_;
 };
 
@@ -322,7 +322,7 @@ Result<RenderBenchResult> time_scene(const Scene& scene,
 
   struct Draw {
     DrawPass pass;
-    DrawTarget target;
+    TimedTarget target;
   };
   std::vector<Draw> draws;
   RenderBenchResult result;
@@ -332,7 +332,7 @@ Result<RenderBenchResult> time_scene(const Scene& scene,
                        Result<DrawPass> pass) -> Status {
     if (!pass) return fail_while(fmt::format("timing {}", name), pass.error());
     result.timings.push_back(timing_of(name, shader, *pass));
-    draws.push_back({std::move(*pass), DrawTarget(raster.width, raster.height)});
+    draws.push_back({std::move(*pass), TimedTarget(raster.width, raster.height)});
     return {};
   };
   const btf::ModelShader plain = plain_textures();

@@ -3,10 +3,23 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "render/egl_context.h"
 #include "render/internal_testing.h"
 
 namespace veneer::render {
 namespace {
+
+// Enough arithmetic that no noise hides it.
+ShaderMaterial busy_material() {
+  return ShaderMaterial(
+      "vec3 x = view + light;"
+      "for (int i = 0; i < 100; ++i) x = fract(sin(x) * 43.7 + uv.xyx);"
+      "return x;");
+}
 
 TEST(RenderBench, RefusesSizesAndFrameCountsItCannotTime) {
   EXPECT_EQ(RenderBenchOptions{.width = 8}.check().error().code, Errc::kInvalidOption);
@@ -17,13 +30,7 @@ TEST(RenderBench, RefusesSizesAndFrameCountsItCannotTime) {
 
 TEST(RenderBench, TimesEveryMaterialAgainstPlain) {
   RenderBenchOptions options{.width = 200, .height = 150, .frames = 7};
-  // Enough arithmetic that no noise hides it.
-  options.materials.push_back(
-      {"busy",
-       std::make_shared<ShaderMaterial>(
-           "vec3 x = view + light;"
-           "for (int i = 0; i < 100; ++i) x = fract(sin(x) * 43.7 + uv.xyx);"
-           "return x;")});
+  options.materials.push_back({"busy", std::make_shared<ShaderMaterial>(busy_material())});
   SilentProgress progress;
   const auto result = bench_render(options, progress);
   if (!result && result.error().code == Errc::kUnavailable) GTEST_SKIP() << result.error().what;
@@ -49,6 +56,85 @@ TEST(RenderBench, SaysWhichMaterialTheDriverRefuses) {
   const auto result = bench_render(options, progress);
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().code, Errc::kUnavailable);
+}
+
+Scene lit_plate() {
+  Scene scene;
+  scene.mesh = *load_mesh("plate");
+  scene.lights = {DirectionalLight{}, PointLight{{0.2, 0.3, 0.8}, {20, 20, 20}}};
+  return scene;
+}
+
+class SceneTimingTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto context = EglContext::create();
+    if (!context) GTEST_SKIP() << context.error().what;
+  }
+  static constexpr int kWidth = 400;
+  static constexpr int kHeight = 300;
+  Result<RenderBenchResult> time(const std::vector<NamedLevel>& levels, int frames = 7) {
+    return time_scene(scene_, profile_, viewpoints_, levels, frames, progress_);
+  }
+  static calibration::ProjectorProfile close_up() {
+    calibration::ProjectorProfile profile = example_profile(kWidth, kHeight, 8);
+    profile.geometry.fx *= 3;  // the plate fills the frame
+    profile.geometry.fy *= 3;
+    return profile;
+  }
+
+  Scene scene_ = lit_plate();
+  calibration::ProjectorProfile profile_ = close_up();
+  std::vector<FrameInput> viewpoints_{{{0, 0, 1}, {}}, {{0.3, 0, 1}, {}}};
+  SilentProgress progress_;
+};
+
+TEST_F(SceneTimingTest, MoreWorkTakesLongerAndASmallerRasterTakesLess) {
+  const ShaderMaterial busy = busy_material();
+  const ShaderMaterial idle("return vec3(0.5);");
+  const auto result = time({{"idle", {&idle, {}}},
+                            {"busy", {&busy, {}}},
+                            {"busy, small", {&busy, {.scale = DrawingOptions::kLeastScale}}}});
+  ASSERT_TRUE(result) << result.error().what;
+  ASSERT_EQ(result->timings.size(), 4U);
+  EXPECT_EQ(result->timings[0].name, "plain");
+  EXPECT_EQ(result->timings[0].ratio, 1.0);
+  EXPECT_EQ(result->timings[0].fetches, 1);
+  EXPECT_GT(result->timings[0].gpu_bytes, 0U);
+  EXPECT_EQ(result->timings[2].name, "busy");
+  EXPECT_GT(result->timings[2].ratio, 2.0 * result->timings[1].ratio);
+  // A sixteenth of the pixels; half as long is far from what noise does.
+  EXPECT_LT(result->timings[3].ratio, 0.5 * result->timings[2].ratio);
+  for (const RenderTiming& timing : result->timings) {
+    EXPECT_GT(timing.ms_median, 0.0);
+    EXPECT_GE(timing.ms_p95, timing.ms_median);
+    EXPECT_DOUBLE_EQ(timing.ratio, timing.ms_median / result->timings[0].ms_median);
+  }
+  EXPECT_FALSE(result->renderer.empty());
+  EXPECT_FALSE(result->clock.empty());
+}
+
+TEST_F(SceneTimingTest, RefusesWhatCannotBeTimed) {
+  const ShaderMaterial idle("return vec3(0.5);");
+  const auto code = [](const Result<RenderBenchResult>& result) {
+    return result ? std::optional<Errc>() : result.error().code;
+  };
+  EXPECT_EQ(code(time({}, 2)), Errc::kInvalidOption);
+  EXPECT_EQ(code(time({{"tiny", {&idle, {.scale = 0.1}}}})), Errc::kInvalidOption);
+  const Scene lit = scene_;
+  scene_.lights.clear();
+  EXPECT_EQ(code(time({})), Errc::kBadFormat);
+  scene_ = lit;
+  viewpoints_.clear();
+  EXPECT_EQ(code(time({})), Errc::kInvalidOption);
+}
+
+TEST_F(SceneTimingTest, SaysWhichLevelTheDriverRefuses) {
+  const ShaderMaterial broken("return nonsense;");
+  const auto result = time({{"the broken one", {&broken, {}}}});
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, Errc::kUnavailable);
+  EXPECT_NE(result.error().what.find("the broken one"), std::string::npos) << result.error().what;
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ constexpr std::string_view kFinishClock = "steady clock around glFinish";
 
 }  // namespace
 
-DrawTarget::DrawTarget(int width, int height)
+TimedTarget::TimedTarget(int width, int height)
     : colour(make_texture_2d(GL_RGBA16F, width, height)),
       depth(make_texture_2d(GL_DEPTH_COMPONENT32F, width, height)),
       framebuffer(make_framebuffer()) {

@@ -18,8 +18,8 @@
 namespace veneer::render {
 
 /// Half floats with depth, as the renderer draws into.
-struct DrawTarget {
-  DrawTarget(int width, int height);
+struct TimedTarget {
+  TimedTarget(int width, int height);
   GlTexture colour;
   GlTexture depth;
   GlFramebuffer framebuffer;
