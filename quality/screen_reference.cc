@@ -80,9 +80,9 @@ Eigen::Vector2d place_of(int pixel, int width) {
 }  // namespace
 
 Status ScreenReferenceOptions::check() const {
-  if (pixels < 1 || pixels > 1'000'000)
+  if (pixels < 1 || pixels > 10'000'000)
     return fail(Errc::kInvalidOption,
-                "comparing on the screen: {} pixels of each view; 1 to 1000000 can be compared",
+                "comparing on the screen: {} pixels of each view; 1 to 10000000 can be compared",
                 pixels);
   if (rays < 1 || rays > 32)
     return fail(Errc::kInvalidOption,

@@ -40,7 +40,7 @@ struct ScreenErrors {
 };
 
 struct ScreenReferenceOptions {
-  int pixels = 2000;  ///< compared in each view, spread over what is covered. 1 to 1'000'000.
+  int pixels = 2000;  ///< compared in each view, spread over what is covered. 1 to 10'000'000.
   /// Along each side of a pixel; what falls between the texels counts. 1 asks for the texel at the
   /// pixel's centre alone. 1 to 32.
   int rays = 8;

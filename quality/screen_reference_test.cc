@@ -374,7 +374,7 @@ TEST_F(ScreenReferenceTest, CountsWhatIsLeftOutAndWhy) {
   // From the side: half of what the projector lights is turned away.
   const std::vector<render::FrameInput> inputs{{{2, 0, 0}, {}}};
   const ScreenReference reference =
-      make(scene, profile, set, {.pixels = 1'000'000, .rays = 2}, {{{2, 0, 0}, {}}});
+      make(scene, profile, set, {.pixels = 10'000'000, .rays = 2}, {{{2, 0, 0}, {}}});
   const ScreenReference::Counts& counts = reference.counts();
   EXPECT_GT(counts.at_edges, 50);  // its silhouette, some 50 pixels across
   EXPECT_GT(counts.out_of_reach, 0);
@@ -406,7 +406,7 @@ TEST_F(ScreenReferenceTest, SaysWhyNothingCanBeCompared) {
 TEST(ScreenReferenceOptions, RefuseWhatCannotBeCompared) {
   EXPECT_TRUE(ScreenReferenceOptions{}.check());
   EXPECT_FALSE(ScreenReferenceOptions{.pixels = 0}.check());
-  EXPECT_FALSE(ScreenReferenceOptions{.pixels = 1'000'001}.check());
+  EXPECT_FALSE(ScreenReferenceOptions{.pixels = 10'000'001}.check());
   EXPECT_FALSE(ScreenReferenceOptions{.rays = 0}.check());
   EXPECT_FALSE(ScreenReferenceOptions{.rays = 33}.check());
 }

@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 #include "render/compensate_pass.h"
 #include "render/draw_pass.h"
@@ -322,9 +324,10 @@ Result<RenderBenchResult> time_scene(const Scene& scene,
 
   struct Draw {
     DrawPass pass;
-    TimedTarget target;
+    const TimedTarget* target;
   };
   std::vector<Draw> draws;
+  std::map<std::pair<int, int>, TimedTarget> targets;  // of each size, for all that have it
   RenderBenchResult result;
   const auto add = [&](const std::string& name,
                        const btf::ModelShader& shader,
@@ -332,7 +335,9 @@ Result<RenderBenchResult> time_scene(const Scene& scene,
                        Result<DrawPass> pass) -> Status {
     if (!pass) return fail_while(fmt::format("timing {}", name), pass.error());
     result.timings.push_back(timing_of(name, shader, *pass));
-    draws.push_back({std::move(*pass), TimedTarget(raster.width, raster.height)});
+    const std::pair size(raster.width, raster.height);
+    draws.push_back(
+        {std::move(*pass), &targets.try_emplace(size, size.first, size.second).first->second});
     return {};
   };
   const btf::ModelShader plain = plain_textures();
@@ -362,7 +367,7 @@ Result<RenderBenchResult> time_scene(const Scene& scene,
     const auto count = static_cast<int>(viewpoints.size());
     const FrameInput& from =
         viewpoints[static_cast<std::size_t>(((frame % count) + count) % count)];
-    draws[which].pass.draw(draws[which].target.framebuffer.id(),
+    draws[which].pass.draw(draws[which].target->framebuffer.id(),
                            mesh,
                            {from.eye_in_world, from.world_from_object, from.specular_weight});
   };

@@ -71,9 +71,9 @@ class SceneTimingTest : public ::testing::Test {
     const auto context = EglContext::create();
     if (!context) GTEST_SKIP() << context.error().what;
   }
-  static constexpr int kWidth = 400;
-  static constexpr int kHeight = 300;
-  Result<RenderBenchResult> time(const std::vector<NamedLevel>& levels, int frames = 7) {
+  static constexpr int kWidth = 200;
+  static constexpr int kHeight = 150;
+  Result<RenderBenchResult> time(const std::vector<NamedLevel>& levels, int frames = 5) {
     return time_scene(scene_, profile_, viewpoints_, levels, frames, progress_);
   }
   static calibration::ProjectorProfile close_up() {
