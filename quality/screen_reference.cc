@@ -74,7 +74,8 @@ class Tally {
 };
 
 Eigen::Vector2d place_of(int pixel, int width) {
-  return {pixel % width + 0.5, pixel / width + 0.5};
+  const int row = pixel / width;
+  return {pixel % width + 0.5, row + 0.5};
 }
 
 }  // namespace
@@ -164,6 +165,7 @@ Result<ScreenReference> ScreenReference::make(const render::Scene& scene,
     return fail(Errc::kInvalidOption,
                 "comparing on the screen: from no viewpoint; give one or more");
   std::vector<render::FrameInput> inputs;
+  inputs.reserve(viewpoints.size());
   for (const Viewpoint& viewpoint : viewpoints)
     inputs.push_back({viewpoint.eye_in_world, viewpoint.world_from_object});
   const btf::SampleSetInfo& info = set.set().info();

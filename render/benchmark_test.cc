@@ -3,12 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "render/egl_context.h"
 #include "render/internal_testing.h"
+#include "render/turns.h"
 
 namespace veneer::render {
 namespace {
@@ -112,6 +114,43 @@ TEST_F(SceneTimingTest, MoreWorkTakesLongerAndASmallerRasterTakesLess) {
   }
   EXPECT_FALSE(result->renderer.empty());
   EXPECT_FALSE(result->clock.empty());
+}
+
+TEST(PlainDraw, SumsTheLightOfAllLightsByTheirCosines) {
+  const auto context = EglContext::create();
+  if (!context) GTEST_SKIP() << context.error().what;
+  const calibration::ProjectorProfile profile = example_profile(64, 48, 8);
+  const MeshBuffers mesh(*load_mesh("sphere"));
+  const btf::ModelShader textures = plain_textures();
+  const TimedTarget target(64, 48);
+  const auto drawn = [&](const std::vector<Light>& lights) {
+    const auto pass = DrawPass::create_plain(textures, lights, {1, 1}, profile);
+    EXPECT_TRUE(pass) << pass.error().what;
+    pass->draw(target.framebuffer.id(), mesh, {{0, 0, 1}, {}});
+    std::vector<Eigen::Vector4f> pixels(64 * 48);
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, target.framebuffer.id());
+    glReadPixels(0, 0, 64, 48, GL_RGBA, GL_FLOAT, pixels.data());
+    return pixels;
+  };
+  const Eigen::Vector3d direction = Eigen::Vector3d(0.3, 0.5, 0.8).normalized();
+  const DirectionalLight sun{direction, {1, 2, 3}};
+  const DirectionalLight low{{1, 0, 0}, {3, 2, 1}};
+  constexpr double kFar = 500;  // times its square, a candela is a lux
+  const PointLight lamp{kFar * direction, kFar * kFar * sun.illuminance_rgb};
+  const auto first = drawn({sun});
+  const auto second = drawn({low});
+  const auto both = drawn({sun, low});
+  const auto with_lamp = drawn({lamp, low});
+  float brightest = 0;
+  // Half floats of three draws, cut or rounded; the lamp is nearer by a tenth of a metre in kFar.
+  constexpr float kTolerance = 3e-3F;
+  for (std::size_t i = 0; i < both.size(); ++i) {
+    const Eigen::Vector3f sum = (first[i] + second[i]).head<3>();
+    EXPECT_LE((both[i].head<3>() - sum).norm(), kTolerance * sum.norm()) << i;
+    EXPECT_LE((with_lamp[i] - both[i]).head<3>().norm(), kTolerance) << i;
+    brightest = std::max(brightest, sum.maxCoeff());
+  }
+  EXPECT_GT(brightest, 0.3F);
 }
 
 TEST_F(SceneTimingTest, RefusesWhatCannotBeTimed) {

@@ -167,6 +167,7 @@ std::vector<ScreenQuery::Share> shares_of(const Vector2d& uv,
       ++hits[texel_along(at.y(), height) * width + texel_along(at.x(), width)];
     }
   std::vector<ScreenQuery::Share> shares;
+  shares.reserve(hits.size());
   for (const auto& [texel, count] : hits)
     shares.push_back({texel, count / static_cast<double>(rays * rays)});
   return shares;

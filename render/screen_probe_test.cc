@@ -113,9 +113,10 @@ TEST_F(ProbeTest, FindsDirectionsLightAndGAsComputedByHandOnAPlate) {
   // What single precision leaves of coordinates and directions.
   constexpr double kRounding = 5e-6;
   for (const ScreenQuery& query : screen.queries) {
+    const int raster_row = query.pixel / kRasterWidth;
     const Vector3d along =
         object_from_projector.rotation * Vector3d((query.pixel % kRasterWidth + 0.5 - g.cx) / g.fx,
-                                                  (query.pixel / kRasterWidth + 0.5 - g.cy) / g.fy,
+                                                  (raster_row + 0.5 - g.cy) / g.fy,
                                                   1.0);
     const Vector3d& projector = object_from_projector.translation;
     const Vector3d point = projector - along * (projector.z() / along.z());
