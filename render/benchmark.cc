@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -14,6 +13,7 @@
 #include "render/compensate_pass.h"
 #include "render/draw_pass.h"
 #include "render/egl_context.h"
+#include "render/level_draws.h"
 #include "render/scene_check.h"
 #include "render/screen_error.h"
 #include "render/turns.h"
@@ -96,7 +96,8 @@ class Bench {
  public:
   static Result<Bench> create(EglContext context, const RenderBenchOptions& options) {
     const calibration::ProjectorProfile profile = bench_profile(options.width, options.height);
-    Bench bench(std::move(context), profile, options.texels_per_pixel);
+    VENEER_ASSIGN(DrawTarget target, DrawTarget::create({options.width, options.height}));
+    Bench bench(std::move(context), profile, options.texels_per_pixel, std::move(target));
     const btf::ModelShader plain = plain_textures();
     VENEER_TRY(bench.add("plain",
                          plain,
@@ -135,12 +136,15 @@ class Bench {
   }
 
  private:
-  Bench(EglContext context, calibration::ProjectorProfile profile, double texels_per_pixel)
+  Bench(EglContext context,
+        calibration::ProjectorProfile profile,
+        double texels_per_pixel,
+        DrawTarget target)
       : context_(std::move(context)),
         texels_per_pixel_(texels_per_pixel),
         profile_(std::move(profile)),
         mesh_(frame_filling_mesh(profile_.geometry)),
-        target_(profile_.geometry.width, profile_.geometry.height) {}
+        target_(std::move(target)) {}
 
   // As many repeats as it takes to lay the material side by side.
   [[nodiscard]] Eigen::Vector2d repeats(int width, int height) const {
@@ -193,8 +197,8 @@ class Bench {
       const std::vector<Vector3d> reference = reference_at(set, screen.queries);
       for (std::size_t e = 1; e < entrants_.size(); ++e) {
         if (!entrants_[e].pass) continue;
-        entrants_[e].pass->draw(target_.framebuffer.id(), mesh_, input);
-        glBindFramebuffer(GL_READ_FRAMEBUFFER, target_.framebuffer.id());
+        entrants_[e].pass->draw(target_.framebuffer(), mesh_, input);
+        glBindFramebuffer(GL_READ_FRAMEBUFFER, target_.framebuffer());
         glPixelStorei(GL_PACK_ALIGNMENT, 4);
         glPixelStorei(GL_PACK_ROW_LENGTH, 0);
         glReadPixels(0,
@@ -219,9 +223,9 @@ class Bench {
 
   void draw(Entrant& entrant, int frame) {
     if (entrant.pass) {
-      entrant.pass->draw(target_.framebuffer.id(), mesh_, input_of(frame));
+      entrant.pass->draw(target_.framebuffer(), mesh_, input_of(frame));
     } else {
-      entrant.compensate->run(target_.colour.id(), static_cast<std::uint32_t>(frame));
+      entrant.compensate->run(target_.colour(), static_cast<std::uint32_t>(frame));
     }
   }
 
@@ -238,23 +242,15 @@ class Bench {
   double texels_per_pixel_;
   calibration::ProjectorProfile profile_;
   MeshBuffers mesh_;
-  TimedTarget target_;
+  DrawTarget target_;
   std::vector<Entrant> entrants_;
 };
 
-// The raster of targets that are drawn smaller; whole pixels, over the same field.
-calibration::ProjectorGeometry scaled_raster(const calibration::ProjectorGeometry& full,
-                                             double scale) {
-  calibration::ProjectorGeometry raster = full;
-  raster.width = std::max(static_cast<int>(std::ceil(full.width * scale)), 1);
-  raster.height = std::max(static_cast<int>(std::ceil(full.height * scale)), 1);
-  const double x = static_cast<double>(raster.width) / full.width;
-  const double y = static_cast<double>(raster.height) / full.height;
-  raster.fx *= x;
-  raster.cx *= x;
-  raster.fy *= y;
-  raster.cy *= y;
-  return raster;
+// Level errors say which by number.
+std::string names_of(std::span<const NamedLevel> levels) {
+  if (levels.size() == 1) return levels.front().name;
+  return fmt::format(
+      "levels 0 ({}) to {} ({})", levels.front().name, levels.size() - 1, levels.back().name);
 }
 
 Status check_frames(int frames) {
@@ -314,70 +310,50 @@ Result<RenderBenchResult> time_scene(const Scene& scene,
   VENEER_TRY(profile.check());
   if (viewpoints.empty())
     return fail(Errc::kInvalidOption, "timing a scene: from no viewpoint; give one or more");
-  for (const NamedLevel& level : levels) {
-    VENEER_CHECK(level.level.material != nullptr);
-    if (const Status status = level.level.drawing.check(); !status)
-      return fail_while(fmt::format("timing {}", level.name), status.error());
-  }
   VENEER_ASSIGN(const EglContext context, EglContext::create());
   const MeshBuffers mesh(scene.mesh);
-
-  struct Draw {
-    DrawPass pass;
-    const TimedTarget* target;
-  };
-  std::vector<Draw> draws;
-  std::map<std::pair<int, int>, TimedTarget> targets;  // of each size, for all that have it
   RenderBenchResult result;
-  const auto add = [&](const std::string& name,
-                       const btf::ModelShader& shader,
-                       const calibration::ProjectorGeometry& raster,
-                       Result<DrawPass> pass) -> Status {
-    if (!pass) return fail_while(fmt::format("timing {}", name), pass.error());
-    result.timings.push_back(timing_of(name, shader, *pass));
-    const std::pair size(raster.width, raster.height);
-    draws.push_back(
-        {std::move(*pass), &targets.try_emplace(size, size.first, size.second).first->second});
-    return {};
-  };
-  const btf::ModelShader plain = plain_textures();
-  VENEER_TRY(add("plain",
-                 plain,
-                 profile.geometry,
-                 DrawPass::create_plain(plain, scene.lights, scene.texture_repeats, profile)));
-  for (const auto& [name, level] : levels) {
-    const btf::ModelShader shader = level.material->shader();
-    const DrawingOptions& drawing = level.drawing;
-    calibration::ProjectorProfile scaled = profile;
-    scaled.geometry = scaled_raster(profile.geometry, drawing.scale);
-    VENEER_TRY(
-        add(name,
-            shader,
-            scaled.geometry,
-            DrawPass::create(shader,
-                             scene.lights,
-                             scene.texture_repeats,
-                             scaled,
-                             {.cache = drawing.cache,
-                              .filter = texel_filter(*level.material, drawing.average_texels),
-                              .evaluation = drawing.evaluation})));
+
+  const btf::ModelShader textures = plain_textures();
+  VENEER_ASSIGN(const DrawTarget target,
+                DrawTarget::create({profile.geometry.width, profile.geometry.height}));
+  VENEER_ASSIGN(const DrawPass plain,
+                DrawPass::create_plain(textures, scene.lights, scene.texture_repeats, profile));
+  result.timings.push_back(timing_of("plain", textures, plain));
+
+  std::vector<Level> unnamed;
+  for (const NamedLevel& level : levels) unnamed.push_back(level.level);
+  std::optional<LevelDraws> draws;
+  if (!levels.empty()) {
+    auto made = LevelDraws::create(scene, unnamed, profile);
+    if (!made) return fail_while(fmt::format("timing {}", names_of(levels)), made.error());
+    draws.emplace(std::move(*made));
+  }
+  btf::ModelShader shader;
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    // Packs all of a material's textures, so once where its levels follow one another.
+    if (i == 0 || unnamed[i].material != unnamed[i - 1].material)
+      shader = unnamed[i].material->shader();
+    result.timings.push_back(timing_of(levels[i].name, shader, draws->pass(i)));
   }
 
   const auto draw = [&](std::size_t which, int frame) {
     const auto count = static_cast<int>(viewpoints.size());
-    const FrameInput& from =
-        viewpoints[static_cast<std::size_t>(((frame % count) + count) % count)];
-    draws[which].pass.draw(draws[which].target->framebuffer.id(),
-                           mesh,
-                           {from.eye_in_world, from.world_from_object, from.specular_weight});
+    FrameInput from = viewpoints[static_cast<std::size_t>(((frame % count) + count) % count)];
+    if (which == 0) {
+      plain.draw(target.framebuffer(), mesh, {from.eye_in_world, from.world_from_object});
+      return;
+    }
+    from.level = from.next_level = which - 1;
+    draws->draw(mesh, from);
   };
-  Turns turns(context, draws.size());
+  Turns turns(context, result.timings.size());
   turns.run(frames, draw, progress);
   turns.report(result);
-  for (std::size_t i = 0; i < draws.size(); ++i) {
-    if (draws[i].pass.cache() == nullptr) continue;
-    draw(i, 0);  // once more, since this is read back
-    result.timings[i].served = mesh.served();
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    if (draws->pass(i).cache() == nullptr) continue;
+    draw(i + 1, 0);  // once more, since this is read back
+    result.timings[i + 1].served = mesh.served();
   }
   return result;
 }

@@ -86,8 +86,9 @@ struct NamedLevel {
   Level level;  ///< its material is borrowed for the call
 };
 
-/// Times the draw pass of each level on a scene: its mesh, its lights, the profile's raster times
-/// the level's scale, into half floats with depth. "plain" is the yardstick: the same mesh on the
+/// Times drawing a scene's target at each level as the renderer does: its mesh, its lights, the
+/// profile's raster, at the level's scale and interpolated up from it, into half floats with depth.
+/// Compensation is not in it. "plain" is the yardstick: the same mesh on the
 /// whole raster, one filtered fetch times the sum of the cosines of all the scene's lights, each
 /// with what arrives of it. All take turns within every frame, and the frames go round the
 /// viewpoints. Ratios are to the plain draw of the same call, so that levels can be timed in

@@ -122,13 +122,14 @@ TEST(PlainDraw, SumsTheLightOfAllLightsByTheirCosines) {
   const calibration::ProjectorProfile profile = example_profile(64, 48, 8);
   const MeshBuffers mesh(*load_mesh("sphere"));
   const btf::ModelShader textures = plain_textures();
-  const TimedTarget target(64, 48);
+  const auto target = DrawTarget::create({64, 48});
+  ASSERT_TRUE(target) << target.error().what;
   const auto drawn = [&](const std::vector<Light>& lights) {
     const auto pass = DrawPass::create_plain(textures, lights, {1, 1}, profile);
     EXPECT_TRUE(pass) << pass.error().what;
-    pass->draw(target.framebuffer.id(), mesh, {{0, 0, 1}, {}});
+    pass->draw(target->framebuffer(), mesh, {{0, 0, 1}, {}});
     std::vector<Eigen::Vector4f> pixels(64 * 48);
-    glBindFramebuffer(GL_READ_FRAMEBUFFER, target.framebuffer.id());
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, target->framebuffer());
     glReadPixels(0, 0, 64, 48, GL_RGBA, GL_FLOAT, pixels.data());
     return pixels;
   };

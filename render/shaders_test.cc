@@ -3,8 +3,10 @@
 
 #include "render/compensate_pass.h"
 #include "render/draw_pass.h"
+#include "render/fade_mask.h"
 #include "render/internal_glslang.h"
 #include "render/scanout_pass.h"
+#include "render/upsample_pass.h"
 
 namespace veneer::render {
 namespace {
@@ -20,6 +22,9 @@ TEST(Shaders, AreValidByTheReferenceCompiler) {
       EXPECT_EQ(glslang_complaints(compensate_fragment_source(kind, has_ceiling), "frag"), "");
   EXPECT_EQ(glslang_complaints(fullscreen_vertex_source(), "vert"), "");
   EXPECT_EQ(glslang_complaints(count_compute_source(), "comp"), "");
+  EXPECT_EQ(glslang_complaints(fade_mask_fragment_source(), "frag"), "");
+  for (const bool has_part : {false, true})
+    EXPECT_EQ(glslang_complaints(upsample_fragment_source(has_part), "frag"), "");
   EXPECT_EQ(glslang_complaints(scanout_fragment_source(), "frag"), "");
   for (const int lights : {1, kMaxLights}) {
     EXPECT_EQ(glslang_complaints(draw_vertex_source(lights), "vert"), "");

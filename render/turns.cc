@@ -18,14 +18,6 @@ constexpr std::string_view kFinishClock = "steady clock around glFinish";
 
 }  // namespace
 
-TimedTarget::TimedTarget(int width, int height)
-    : colour(make_texture_2d(GL_RGBA16F, width, height)),
-      depth(make_texture_2d(GL_DEPTH_COMPONENT32F, width, height)),
-      framebuffer(make_framebuffer()) {
-  glNamedFramebufferTexture(framebuffer.id(), GL_COLOR_ATTACHMENT0, colour.id(), 0);
-  glNamedFramebufferTexture(framebuffer.id(), GL_DEPTH_ATTACHMENT, depth.id(), 0);
-}
-
 btf::ModelShader plain_textures() {
   btf::ModelTexture texture;
   texture.sampler = "Albedo";

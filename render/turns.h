@@ -17,14 +17,6 @@
 
 namespace veneer::render {
 
-/// Half floats with depth, as the renderer draws into.
-struct TimedTarget {
-  TimedTarget(int width, int height);
-  GlTexture colour;
-  GlTexture depth;
-  GlFramebuffer framebuffer;
-};
-
 /// The yardstick's texture, "Albedo" of plain.frag, kPlainTexels along a side.
 [[nodiscard]] btf::ModelShader plain_textures();
 inline constexpr int kPlainTexels = 256;
