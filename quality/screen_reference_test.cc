@@ -160,6 +160,28 @@ TEST_F(ScreenReferenceTest, AnExactMaterialErrsByHalfFloatsAndCodesAlone) {
   }
 }
 
+TEST_F(ScreenReferenceTest, ASmallerRasterCostsDetailAndNothingElse) {
+  const calibration::ProjectorProfile profile = profile_of(12);
+  render::Scene scene = scene_of("plate");
+  const auto at_half = [&](const btf::InterpolatedSet& set, const btf::Material& material) {
+    const ScreenReference reference = make(scene, profile, set, {.pixels = 500, .rays = 4});
+    const auto errors = measure_on_screen(reference, scene, profile, {&material, {.scale = 0.5}});
+    if (!errors) throw std::runtime_error(errors.error().what);
+    return *errors;
+  };
+  const btf::InterpolatedSet even =
+      matt_set(1, 1, [](int, int) { return Vector3d(0.5, 0.25, 0.125); });
+  const render::ShaderMaterial even_material("return vec3(0.5, 0.25, 0.125) * max(light.z, 0.0);");
+  const ScreenErrors smooth = at_half(even, even_material);
+  EXPECT_LT(smooth.target.de00_max, 0.3);  // light and G change little from pixel to pixel
+  EXPECT_LT(smooth.received.de00_max, 0.3);
+  scene.texture_repeats = {6, 6};  // texels of two pixels, one of the smaller raster's
+  const ScreenErrors detailed =
+      at_half(matt_set(kStripesX, kStripesY, stripes),
+              render::ShaderMaterial(kStripesShader, kStripesX, kStripesY));
+  EXPECT_GT(detailed.target.de00_mean, 10 * smooth.target.de00_mean);
+}
+
 TEST_F(ScreenReferenceTest, DitherOfSeveralSeedsIsNoError) {
   const render::Scene scene = scene_of("plate");
   const btf::InterpolatedSet set =

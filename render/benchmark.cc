@@ -322,6 +322,7 @@ Result<RenderBenchResult> time_scene(const Scene& scene,
   result.timings.push_back(timing_of("plain", textures, plain));
 
   std::vector<Level> unnamed;
+  unnamed.reserve(levels.size());
   for (const NamedLevel& level : levels) unnamed.push_back(level.level);
   std::optional<LevelDraws> draws;
   if (!levels.empty()) {
