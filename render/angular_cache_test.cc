@@ -29,38 +29,6 @@ const DirectionalLight kSun{Vector3d(0.3, 0.4, 0.85).normalized(),
                             Vector3d::Constant(std::numbers::pi)};
 const PointLight kLamp{{0.2, -0.1, 0.5}, {0.6, 0.4, 0.3}};
 
-// Two clusters, chosen by texel, of smooth functions of both directions with slopes up to 1: the
-// sample is what the cache interpolates, so that its error is the interpolation's alone.
-btf::ModelShader smooth_model() {
-  btf::ModelShader shader;
-  shader.source = R"(
-vec3 smooth_values(int cluster, vec3 view, vec3 light) {
-  vec3 value = 0.5 + 0.25 * vec3(view.x + light.y, view.y - light.x, view.z * light.z);
-  return light.z > 0.0 ? (cluster == 0 ? value : value.zxy) : vec3(0.0);
-}
-int cluster_at(vec2 uv) { return int(floor(uv.x * 40.0) + floor(uv.y * 40.0)) & 1; }
-vec3 btf_radiance(vec2 uv, vec3 view, vec3 light) {
-  return smooth_values(cluster_at(uv), view, light);
-}
-#ifdef CACHE_NODES
-struct EigenPlace { vec3 view; vec3 light; };
-EigenPlace eigen_place(vec3 view, vec3 light) { return EigenPlace(view, light); }
-void eigen_values(EigenPlace place, int cluster, out vec4 values[kCacheLayers]) {
-  values[0] = vec4(smooth_values(cluster, place.view, place.light).xy, 0.0, 0.0);
-  values[1] = vec4(smooth_values(cluster, place.view, place.light).z);
-}
-#endif
-#ifdef CACHE_PIXELS
-vec3 btf_radiance_cached(vec2 uv) {
-  int cluster = cluster_at(uv);
-  return vec3(cached_eigen(cluster, 0).xy, cached_eigen(cluster, 1).w);
-}
-#endif
-)";
-  shader.cache = btf::EigenCache{.clusters = 2, .layers = 2, .texel_fetches = 0};
-  return shader;
-}
-
 class AngularCacheTest : public ::testing::Test {
  protected:
   void SetUp() override {

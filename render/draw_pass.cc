@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/draw_pass.h"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <numbers>
@@ -25,6 +26,9 @@ constexpr char kDrawFrag[] =
 
 constexpr char kPlainFrag[] =
 #include "render/shaders/plain.frag.inc"
+    ;
+constexpr char kProbeFrag[] =
+#include "render/shaders/probe.frag.inc"
     ;
 
 // The block Frame of frame.glsl, with room for every light; a program reads as much as it declares.
@@ -87,22 +91,30 @@ std::string draw_fragment_source(const std::string& model_source,
          radiance_source("btf_radiance(uv, view, light)", filter) + kDrawFrag;
 }
 
-std::string plain_fragment_source() { return header(1) + kPlainFrag; }
+std::string plain_fragment_source(int light_count, bool point_lights) {
+  return surface_header(light_count) + (point_lights ? "#define POINT_LIGHTS\n" : "") + kPlainFrag;
+}
+
+std::string probe_fragment_source(int light_count) {
+  return surface_header(light_count) + kProbeFrag;
+}
 
 DrawPass::DrawPass(std::vector<Light> lights,
                    const Eigen::Vector2d& texture_repeats,
-                   const calibration::ProjectorProfile& profile)
+                   const calibration::ProjectorProfile& profile,
+                   double scale)
     : uniforms_(make_buffer(nullptr, sizeof(FrameBlock), GL_DYNAMIC_STORAGE_BIT)),
       lights_(std::move(lights)),
       texture_repeats_(texture_repeats),
-      width_(profile.geometry.width),
-      height_(profile.geometry.height) {
+      projector_raster_(profile.geometry.width, profile.geometry.height),
+      raster_(scaled_raster(projector_raster_, scale)) {
   VENEER_CHECK(!lights_.empty() && lights_.size() <= kMaxLights);
   set_projector(profile);
 }
 
 void DrawPass::set_projector(const calibration::ProjectorProfile& profile) {
-  VENEER_CHECK(profile.geometry.width == width_ && profile.geometry.height == height_);
+  VENEER_CHECK(profile.geometry.width == projector_raster_.x() &&
+               profile.geometry.height == projector_raster_.y());
   clip_from_world_ = clip_from_projector(profile.geometry) *
                      profile.geometry.world_from_projector.inverse().matrix();
   projector_in_world_ = profile.geometry.world_from_projector.translation;
@@ -114,8 +126,17 @@ Status DrawPass::link(const std::string& fragment_source, const btf::ModelShader
       program_,
       link_program(
           {{GL_VERTEX_SHADER, "draw.vert", draw_vertex_source(static_cast<int>(lights_.size()))},
-           {GL_FRAGMENT_SHADER, "draw.frag or plain.frag", fragment_source}}));
-  VENEER_ASSIGN(textures_, ModelTextures::upload(textures, program_.id()));
+           {GL_FRAGMENT_SHADER, "draw.frag, plain.frag or probe.frag", fragment_source}}));
+  return provide(textures);
+}
+
+// What the program reads: uploaded, where no other pass did, and told to it.
+Status DrawPass::provide(const btf::ModelShader& textures) {
+  if (textures_ == nullptr) {
+    VENEER_ASSIGN(ModelTextures uploaded, ModelTextures::upload(textures));
+    textures_ = std::make_shared<const ModelTextures>(std::move(uploaded));
+  }
+  ModelTextures::assign_units(textures, program_.id());
   return {};
 }
 
@@ -123,10 +144,12 @@ Result<DrawPass> DrawPass::create(const btf::ModelShader& shader,
                                   std::vector<Light> lights,
                                   const Eigen::Vector2d& texture_repeats,
                                   const calibration::ProjectorProfile& profile,
-                                  const DrawOptions& options) {
+                                  const DrawOptions& options,
+                                  Textures textures) {
   VENEER_TRY(options.cache.check());
   const auto light_count = static_cast<int>(lights.size());
-  DrawPass pass(std::move(lights), texture_repeats, profile);
+  DrawPass pass(std::move(lights), texture_repeats, profile, options.scale);
+  pass.textures_ = std::move(textures);
   if (options.evaluation == Evaluation::kCompute) {
     VENEER_TRY(pass.link_compute(shader, options));
     return pass;
@@ -142,19 +165,20 @@ Status DrawPass::link_compute(const btf::ModelShader& shader, const DrawOptions&
                 "evaluation in a compute pass does not use the angular cache; set its spacing to 0 "
                 "or evaluate in the fragment stage");
   const auto light_count = static_cast<int>(lights_.size());
-  VENEER_ASSIGN(surface_, SurfaceBuffer::create(light_count, width_, height_));
+  VENEER_ASSIGN(surface_, SurfaceBuffer::create(light_count, raster_.x(), raster_.y()));
   VENEER_ASSIGN(program_,
                 link_program({{GL_COMPUTE_SHADER,
                                "draw.comp",
                                draw_compute_source(shader.source, light_count, options.filter)}}));
-  VENEER_ASSIGN(textures_, ModelTextures::upload(shader, program_.id()));
+  VENEER_TRY(provide(shader));
   surface_->assign(program_.id(), static_cast<GLuint>(shader.textures.size()));
   return {};
 }
 
 Status DrawPass::add_cache(const btf::ModelShader& shader, const DrawOptions& options) {
   const auto light_count = static_cast<int>(lights_.size());
-  VENEER_ASSIGN(cache_, AngularCache::create(shader, light_count, options.cache, width_, height_));
+  VENEER_ASSIGN(cache_,
+                AngularCache::create(shader, light_count, options.cache, raster_.x(), raster_.y()));
   VENEER_ASSIGN(cached_program_,
                 link_program({{GL_VERTEX_SHADER, "draw.vert", draw_vertex_source(light_count)},
                               {GL_FRAGMENT_SHADER,
@@ -168,15 +192,41 @@ Status DrawPass::add_cache(const btf::ModelShader& shader, const DrawOptions& op
 }
 
 Result<DrawPass> DrawPass::create_plain(const btf::ModelShader& textures,
-                                        const DirectionalLight& light,
+                                        std::vector<Light> lights,
                                         const Eigen::Vector2d& texture_repeats,
                                         const calibration::ProjectorProfile& profile) {
-  DrawPass pass({light}, texture_repeats, profile);
-  VENEER_TRY(pass.link(plain_fragment_source(), textures));
+  const auto light_count = static_cast<int>(lights.size());
+  const bool point_lights = std::ranges::any_of(
+      lights, [](const Light& light) { return std::holds_alternative<PointLight>(light); });
+  DrawPass pass(std::move(lights), texture_repeats, profile);
+  VENEER_TRY(pass.link(plain_fragment_source(light_count, point_lights), textures));
+  return pass;
+}
+
+Result<DrawPass> DrawPass::create_probe(std::vector<Light> lights,
+                                        const Eigen::Vector2d& texture_repeats,
+                                        const calibration::ProjectorProfile& profile) {
+  const auto light_count = static_cast<int>(lights.size());
+  DrawPass pass(std::move(lights), texture_repeats, profile);
+  VENEER_TRY(pass.link(probe_fragment_source(light_count), {}));
   return pass;
 }
 
 void DrawPass::draw(GLuint framebuffer, const MeshBuffers& mesh, const DrawInput& input) const {
+  draw(framebuffer, mesh, input, nullptr);
+}
+
+void DrawPass::draw(GLuint framebuffer,
+                    const MeshBuffers& mesh,
+                    const DrawInput& input,
+                    const DrawMask& mask) const {
+  draw(framebuffer, mesh, input, &mask);
+}
+
+void DrawPass::draw(GLuint framebuffer,
+                    const MeshBuffers& mesh,
+                    const DrawInput& input,
+                    const DrawMask* mask) const {
   const RigidTransform object_from_world = input.world_from_object.inverse();
   FrameBlock block;
   block.clip_from_object = (clip_from_world_ * input.world_from_object.matrix()).cast<float>();
@@ -200,10 +250,10 @@ void DrawPass::draw(GLuint framebuffer, const MeshBuffers& mesh, const DrawInput
         (cache_->nodes_from_clip() * clip_from_world_ * input.world_from_object.matrix())
             .cast<float>();
     glNamedBufferSubData(node_uniforms_.id(), 0, sizeof(block), &block);
-    cache_->fill(mesh, textures_, uniforms_.id(), node_uniforms_.id());
+    cache_->fill(mesh, *textures_, uniforms_.id(), node_uniforms_.id());
   }
 
-  glViewport(0, 0, width_, height_);
+  glViewport(0, 0, raster_.x(), raster_.y());
   glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
   glDisable(GL_BLEND);
   glEnable(GL_DEPTH_TEST);
@@ -211,15 +261,21 @@ void DrawPass::draw(GLuint framebuffer, const MeshBuffers& mesh, const DrawInput
   glClearDepth(0.0);
   if (surface_) {
     surface_->begin();
+    if (mask != nullptr) mask->write();
     use(surface_->program());
     mesh.draw();
-    textures_.bind();
+    textures_->bind();
     use(program_.id());
-    surface_->evaluate(framebuffer);
+    surface_->evaluate(framebuffer, mask != nullptr);
     return;
   }
-  clear(framebuffer);
-  textures_.bind();
+  if (mask == nullptr) {
+    clear(framebuffer);
+  } else {
+    glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
+    mask->write();
+  }
+  textures_->bind();
   if (cache_) {
     cache_->bind();
     use(cached_program_.id());

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,7 +14,9 @@
 #include "btf/model_shader.h"
 #include "calibration/profile.h"
 #include "render/angular_cache.h"
+#include "render/draw_target.h"
 #include "render/evaluation.h"
+#include "render/fade_mask.h"
 #include "render/gl_objects.h"
 #include "render/mesh_buffers.h"
 #include "render/model_textures.h"
@@ -27,6 +30,7 @@ struct DrawOptions {
   AngularCacheOptions cache{};
   TexelFilter filter{};
   Evaluation evaluation = Evaluation::kFragment;
+  double scale = 1;  ///< of the raster that is drawn on (scaled_raster()); the picture is the same
 };
 
 /// Clip coordinates from the projector's frame. Row 0 of the framebuffer is the first row of the
@@ -44,7 +48,10 @@ inline constexpr double kNearPlane = 0.01;  // metres
                                                int light_count,
                                                const TexelFilter& filter = {});
 /// The same for the benchmark's yardstick, plain.frag, which reads the texture "Albedo".
-[[nodiscard]] std::string plain_fragment_source();
+/// @param point_lights  whether any of them is one.
+[[nodiscard]] std::string plain_fragment_source(int light_count, bool point_lights);
+/// The same for reading back what each pixel asks, probe.frag.
+[[nodiscard]] std::string probe_fragment_source(int light_count);
 
 /// Where a frame is seen from and drawn on.
 struct DrawInput {
@@ -57,16 +64,24 @@ struct DrawInput {
 /// cd/m^2 and the geometric factor (surface.glsl). Needs a current context, always the same.
 class DrawPass {
  public:
+  /// Shared by all passes that draw one material.
+  using Textures = std::shared_ptr<const ModelTextures>;
+  /// @param textures  of another pass with the same shader; null: uploads them.
   /// Errors: kUnavailable (the driver refuses the shader, a texture is too large), kInvalidOption
   /// (the angular cache with evaluation in a compute pass).
   [[nodiscard]] static Result<DrawPass> create(const btf::ModelShader& shader,
                                                std::vector<Light> lights,
                                                const Eigen::Vector2d& texture_repeats,
                                                const calibration::ProjectorProfile& profile,
-                                               const DrawOptions& options = {});
-  /// The yardstick of the benchmark, for one directional light; `textures` holds "Albedo".
+                                               const DrawOptions& options = {},
+                                               Textures textures = nullptr);
+  /// The yardstick of the benchmark; `textures` holds "Albedo".
   [[nodiscard]] static Result<DrawPass> create_plain(const btf::ModelShader& textures,
-                                                     const DirectionalLight& light,
+                                                     std::vector<Light> lights,
+                                                     const Eigen::Vector2d& texture_repeats,
+                                                     const calibration::ProjectorProfile& profile);
+  /// What each pixel asks, into as many colour attachments as probe.frag has outputs.
+  [[nodiscard]] static Result<DrawPass> create_probe(std::vector<Light> lights,
                                                      const Eigen::Vector2d& texture_repeats,
                                                      const calibration::ProjectorProfile& profile);
   /// From the next draw on, where another profile says that the projector stands; its raster is the
@@ -74,9 +89,17 @@ class DrawPass {
   void set_projector(const calibration::ProjectorProfile& profile);
   /// Clears the framebuffer and draws. Sets all GL state that it needs. Evaluated in a compute
   /// pass, only its colour is written, and its depth stays as it was.
+  /// @param framebuffer  of the size raster().
   void draw(GLuint framebuffer, const MeshBuffers& mesh, const DrawInput& input) const;
+  /// Draws one part of a fade, without clearing the colour. The angular cache is filled whole.
+  void draw(GLuint framebuffer,
+            const MeshBuffers& mesh,
+            const DrawInput& input,
+            const DrawMask& mask) const;
   /// Clears the framebuffer alone: a frame in which nothing is covered.
   void clear(GLuint framebuffer) const;
+  [[nodiscard]] const Eigen::Vector2i& raster() const { return raster_; }
+  [[nodiscard]] const Textures& textures() const { return textures_; }
   /// Null where every pixel is drawn by itself.
   [[nodiscard]] const AngularCache* cache() const { return cache_ ? &*cache_ : nullptr; }
   /// Null where fragments are evaluated as they are drawn.
@@ -85,13 +108,19 @@ class DrawPass {
  private:
   DrawPass(std::vector<Light> lights,
            const Eigen::Vector2d& texture_repeats,
-           const calibration::ProjectorProfile& profile);
+           const calibration::ProjectorProfile& profile,
+           double scale = 1);
   [[nodiscard]] Status link(const std::string& fragment_source, const btf::ModelShader& textures);
+  [[nodiscard]] Status provide(const btf::ModelShader& textures);
   [[nodiscard]] Status link_compute(const btf::ModelShader& shader, const DrawOptions& options);
   [[nodiscard]] Status add_cache(const btf::ModelShader& shader, const DrawOptions& options);
+  void draw(GLuint framebuffer,
+            const MeshBuffers& mesh,
+            const DrawInput& input,
+            const DrawMask* mask) const;
   void use(GLuint program) const;
   GlProgram program_;
-  ModelTextures textures_;
+  Textures textures_;
   GlBuffer uniforms_;
   std::optional<SurfaceBuffer> surface_;  // where program_ is a compute program
   // The cache, the program that draws from it, and the uniforms with which its nodes are drawn.
@@ -103,8 +132,8 @@ class DrawPass {
   Eigen::Matrix4d clip_from_world_;
   Eigen::Vector3d projector_in_world_;
   double reference_distance_m_ = 0;
-  int width_;
-  int height_;
+  Eigen::Vector2i projector_raster_;
+  Eigen::Vector2i raster_;  // that is drawn on
 };
 
 }  // namespace veneer::render

@@ -17,8 +17,11 @@ struct DrawingOptions {
   bool average_texels = false;
   /// Compute goes without the angular cache.
   Evaluation evaluation = Evaluation::kFragment;
-  /// Of the raster's sides: the targets are drawn on a raster this much smaller, and compensation
-  /// interpolates between them. kLeastScale to 1.
+  /// Of the raster's sides: targets are drawn on a raster this much smaller, rounded up, and
+  /// brought to the projector's by interpolating target and geometric factor between the four
+  /// nearest pixels that see the surface; the nearest says whether there is any. Pixels are of the
+  /// smaller raster where the cache counts them and texels are averaged. Compensation and counts
+  /// are of the projector's pixels. kLeastScale to 1, which costs nothing.
   double scale = 1;
   static constexpr double kLeastScale = 0.25;
   /// Errors: kInvalidOption.

@@ -203,7 +203,8 @@ Result<std::vector<Vector4f>> draw(const btf::ModelShader& shader,
   VENEER_ASSIGN(const GlProgram program,
                 link_program({{GL_VERTEX_SHADER, "fullscreen.vert", fullscreen_vertex_source()},
                               {GL_FRAGMENT_SHADER, "the model", probe_source(shader)}}));
-  VENEER_ASSIGN(const ModelTextures textures, ModelTextures::upload(shader, program.id()));
+  VENEER_ASSIGN(const ModelTextures textures, ModelTextures::upload(shader));
+  ModelTextures::assign_units(shader, program.id());
   std::vector<Vector4f> input;
   for (std::size_t i = 0; i < all.size(); ++i) {
     // In any repeat of the sample, those at negative coordinates too.

@@ -110,7 +110,7 @@ Result<GlTexture> upload_one(const ModelTexture& t) {
 
 }  // namespace
 
-Result<ModelTextures> ModelTextures::upload(const btf::ModelShader& shader, GLuint program) {
+Result<ModelTextures> ModelTextures::upload(const btf::ModelShader& shader) {
   const auto units = static_cast<std::size_t>(limit(GL_MAX_TEXTURE_IMAGE_UNITS));
   if (shader.textures.size() > units)
     return fail(Errc::kUnavailable,
@@ -122,7 +122,6 @@ Result<ModelTextures> ModelTextures::upload(const btf::ModelShader& shader, GLui
     VENEER_ASSIGN(GlTexture texture, upload_one(t));
     result.textures_.push_back(std::move(texture));
   }
-  assign_units(shader, program);
   if (glGetError() == GL_OUT_OF_MEMORY)
     return fail(
         Errc::kUnavailable,

@@ -13,11 +13,10 @@ namespace veneer::render {
 /// The textures that a model's shader reads, on the GPU.
 class ModelTextures {
  public:
-  /// Uploads and tells `program` which unit each sampler reads, counted from 0.
   /// Errors: kUnavailable where one is larger than this GL takes, where there are too many, or
   /// where its memory does not suffice.
-  [[nodiscard]] static Result<ModelTextures> upload(const btf::ModelShader& shader, GLuint program);
-  /// The same units for another program of the same material.
+  [[nodiscard]] static Result<ModelTextures> upload(const btf::ModelShader& shader);
+  /// Tells a program of the material which unit each sampler reads, counted from 0.
   static void assign_units(const btf::ModelShader& shader, GLuint program);
   void bind() const;
 

@@ -8,13 +8,14 @@
 #include <utility>
 
 #include "render/compensate_pass.h"
-#include "render/draw_pass.h"
 #include "render/egl_context.h"
 #include "render/gpu_timer.h"
+#include "render/level_draws.h"
 #include "render/mesh_buffers.h"
 #include "render/prepared_profile.h"
 #include "render/scanout_buffers.h"
 #include "render/scanout_pass.h"
+#include "render/scene_check.h"
 
 namespace veneer::render {
 namespace {
@@ -26,49 +27,6 @@ std::chrono::nanoseconds thread_time() {
   return std::chrono::seconds(used.tv_sec) + std::chrono::nanoseconds(used.tv_nsec);
 }
 
-bool is_finite(const DirectionalLight& light) {
-  return light.direction_to_light.allFinite() && light.illuminance_rgb.allFinite();
-}
-bool is_finite(const PointLight& light) {
-  return light.position.allFinite() && light.intensity_rgb.allFinite();
-}
-
-Status check(const Scene& scene) {
-  const Mesh& mesh = scene.mesh;
-  if (scene.lights.empty() || scene.lights.size() > kMaxLights)
-    return fail(Errc::kBadFormat,
-                "making a renderer: the scene has {} lights; 1 to {} can be drawn",
-                scene.lights.size(),
-                kMaxLights);
-  const std::size_t count = mesh.positions.size();
-  if (mesh.triangles.empty() || mesh.normals.size() != count ||
-      mesh.texture_coordinates.size() != count)
-    return fail(Errc::kBadFormat,
-                "making a renderer: the mesh has {} triangles, {} positions, {} normals and {} "
-                "texture coordinates; it needs triangles, and one of the others for every vertex",
-                mesh.triangles.size(),
-                count,
-                mesh.normals.size(),
-                mesh.texture_coordinates.size());
-  for (const auto& triangle : mesh.triangles) {
-    for (const std::uint32_t vertex : triangle) {
-      if (vertex >= count)
-        return fail(Errc::kBadFormat,
-                    "making a renderer: a triangle of the mesh names vertex {} of {}",
-                    vertex,
-                    count);
-    }
-  }
-  for (const Light& light : scene.lights) {
-    const bool finite = std::visit([](const auto& l) { return is_finite(l); }, light);
-    if (!finite)
-      return fail(Errc::kBadFormat,
-                  "making a renderer: a light of the scene has a direction, a position or an "
-                  "intensity that is no number; correct the scene");
-  }
-  return {};
-}
-
 // In single precision, as GL gets it.
 bool fits(const Eigen::Vector3d& v) { return v.cast<float>().allFinite(); }
 
@@ -77,7 +35,8 @@ bool fits(const Eigen::Vector3d& v) { return v.cast<float>().allFinite(); }
 bool is_sound(const FrameInput& input) {
   return fits(input.eye_in_world) && fits(input.world_from_object.translation) &&
          input.world_from_object.rotation.coeffs().cast<float>().allFinite() &&
-         input.specular_weight >= 0.0 && input.specular_weight <= 1.0;
+         input.specular_weight >= 0.0 && input.specular_weight <= 1.0 && input.fade >= 0.0 &&
+         input.fade <= 1.0;
 }
 
 class GlRenderer final : public Renderer {
@@ -88,24 +47,13 @@ class GlRenderer final : public Renderer {
                                                   const PreparedProfile& prepared,
                                                   const RendererOptions& options,
                                                   const Scanout* scanout) {
-    const calibration::ProjectorProfile& profile = prepared.profile();
-    const btf::Material& material = *levels.front().material;
-    const DrawingOptions& drawing = levels.front().drawing;
-    const DrawOptions draw_options{.cache = drawing.cache,
-                                   .filter = texel_filter(material, drawing.average_texels),
-                                   .evaluation = drawing.evaluation};
-    VENEER_ASSIGN(
-        DrawPass draw,
-        DrawPass::create(
-            material.shader(), scene.lights, scene.texture_repeats, profile, draw_options));
+    VENEER_ASSIGN(LevelDraws draws, LevelDraws::create(scene, levels, prepared.profile()));
     VENEER_ASSIGN(CompensatePass compensate,
                   CompensatePass::create(prepared, options.exchangeable));
     auto renderer = std::unique_ptr<GlRenderer>(new GlRenderer(
-        std::move(context), scene.mesh, prepared, std::move(draw), std::move(compensate)));
-    if (glCheckNamedFramebufferStatus(renderer->target_framebuffer_.id(), GL_FRAMEBUFFER) !=
-        GL_FRAMEBUFFER_COMPLETE)
-      return fail(Errc::kUnavailable,
-                  "making a renderer: this GL cannot draw to half floats with depth");
+        std::move(context), scene.mesh, prepared, std::move(draws), std::move(compensate)));
+    // Of one level alone the first frame compiles what is left, as it always has.
+    if (levels.size() > 1) renderer->draws_.warm_up(renderer->mesh_);
     if (scanout != nullptr) VENEER_TRY(renderer->import(*scanout));
     return renderer;
   }
@@ -140,7 +88,7 @@ class GlRenderer final : public Renderer {
           ceiling_);
     context_.make_current();
     VENEER_TRY(compensate_.set_profile(prepared));
-    draw_.set_projector(prepared.profile());
+    draws_.set_projector(prepared.profile());
     return {};
   }
 
@@ -149,14 +97,12 @@ class GlRenderer final : public Renderer {
     const std::chrono::nanoseconds begin = software_ ? thread_time() : std::chrono::nanoseconds{};
     timer_.begin();
     if (is_sound(input)) {
-      draw_.draw(target_framebuffer_.id(),
-                 mesh_,
-                 {input.eye_in_world, input.world_from_object, input.specular_weight});
+      draws_.draw(mesh_, input);
     } else {
-      draw_.clear(target_framebuffer_.id());
+      draws_.clear();
     }
     timer_.split();
-    compensate_.run(target_.id(), input.dither_seed);
+    compensate_.run(draws_.target().colour(), input.dither_seed);
     timer_.end();
     glFlush();
     if (software_)
@@ -170,7 +116,7 @@ class GlRenderer final : public Renderer {
 
   void read_target(ImageView<Rgb32f> target_xyz) override {
     static_assert(sizeof(Rgb32f) == 3 * sizeof(float));
-    read(target_framebuffer_.id(), GL_RGB, GL_FLOAT, target_xyz);
+    read(draws_.target().framebuffer(), GL_RGB, GL_FLOAT, target_xyz);
   }
 
   void finish() override {
@@ -202,7 +148,7 @@ class GlRenderer final : public Renderer {
   GlRenderer(EglContext context,
              const Mesh& mesh,
              const PreparedProfile& prepared,
-             DrawPass draw,
+             LevelDraws draws,
              CompensatePass compensate)
       : context_(std::move(context)),
         width_(prepared.profile().geometry.width),
@@ -211,14 +157,8 @@ class GlRenderer final : public Renderer {
         ceiling_(prepared.compensation().ceiling().nits()),
         software_(context_.is_software()),
         mesh_(mesh),
-        target_(make_texture_2d(GL_RGBA16F, width_, height_)),
-        depth_(make_texture_2d(GL_DEPTH_COMPONENT32F, width_, height_)),
-        target_framebuffer_(make_framebuffer()),
-        draw_(std::move(draw)),
-        compensate_(std::move(compensate)) {
-    glNamedFramebufferTexture(target_framebuffer_.id(), GL_COLOR_ATTACHMENT0, target_.id(), 0);
-    glNamedFramebufferTexture(target_framebuffer_.id(), GL_DEPTH_ATTACHMENT, depth_.id(), 0);
-  }
+        draws_(std::move(draws)),
+        compensate_(std::move(compensate)) {}
 
   Status import(const Scanout& scanout) {
     VENEER_ASSIGN(scanout_pass_, ScanoutPass::create(bits_));
@@ -247,10 +187,7 @@ class GlRenderer final : public Renderer {
   bool software_;
   double software_ms_ = 0;
   MeshBuffers mesh_;
-  GlTexture target_;
-  GlTexture depth_;
-  GlFramebuffer target_framebuffer_;
-  DrawPass draw_;
+  LevelDraws draws_;
   CompensatePass compensate_;
   GpuTimer timer_;
   ScanoutBuffers scanout_buffers_;
@@ -264,7 +201,7 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const Scene& scene,
                                                    const calibration::ProjectorProfile& profile,
                                                    const RendererOptions& options,
                                                    const Scanout* scanout) {
-  VENEER_TRY(check(scene));
+  VENEER_TRY(check_drawable(scene));
   auto prepared = PreparedProfile::prepare(profile, options);
   if (!prepared) return fail_while("making a renderer", prepared.error());
   if (scanout != nullptr && scanout->gbm_device == nullptr)

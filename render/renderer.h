@@ -37,7 +37,7 @@ struct RendererOptions {
 };
 
 /// What one frame needs to know. Where any of it is no number that single precision holds, or
-/// specular_weight is not in [0, 1], the frame is dark.
+/// specular_weight or fade is not in [0, 1], the frame is dark.
 struct FrameInput {
   Eigen::Vector3d eye_in_world;
   RigidTransform world_from_object;
@@ -46,11 +46,15 @@ struct FrameInput {
   /// left. Highlights tell a wrong eye at once, so they can go while nobody knows where it is.
   /// Does nothing to materials without Material::has_specular_term().
   double specular_weight = 1.0;
-  /// Which of the renderer's levels is drawn.
+  /// Which of the renderer's levels is drawn; it and next_level exist (checked).
   std::size_t level = 0;
   /// The one that takes its place, and how much of the picture is already its own: 0, none, to 1,
-  /// all. In between, parts of the picture go over one after another, so that a frame costs between
-  /// the one level and the other, and nothing is seen to jump.
+  /// all; without effect where the two are the same. In between, tiles of the picture go over one
+  /// after another, each once and far from the one before, and only one of the two levels is shaded
+  /// in each: whoever changes levels because time is short has none for drawing both, which a mix
+  /// of the two would need. What a level does for the whole frame (transforming vertices, filling
+  /// the angular cache, reading what a compute pass evaluates) is done for both; where their scales
+  /// differ, the smaller is drawn a pixel beyond its tiles.
   std::size_t next_level = 0;
   double fade = 0.0;
 };

@@ -64,6 +64,38 @@ TEST(RendererAllocation, AFrameDoesNotAllocateOnceWarm) {
   EXPECT_EQ(allocations, before);
 }
 
+TEST(RendererAllocation, AFadeBetweenLevelsDoesNotAllocateOnceWarm) {
+  if (const auto context = EglContext::create(); !context) GTEST_SKIP() << context.error().what;
+  Scene scene;
+  scene.mesh = *load_mesh("sphere");
+  scene.lights = {DirectionalLight{}};
+  const ShaderMaterial plain("return vec3(view.z * light.z);");
+  const ShaderMaterial smooth(smooth_model());
+  const std::vector<Level> levels{{&plain, {}},
+                                  {&plain, {.evaluation = Evaluation::kCompute}},
+                                  {&plain, {.scale = 0.5}},
+                                  {&plain, {.evaluation = Evaluation::kCompute, .scale = 0.5}},
+                                  {&smooth, {.cache = {.spacing = 8}, .scale = 0.7}}};
+  const auto renderer = Renderer::create(scene, levels, example_profile(64, 48, 8), {});
+  ASSERT_TRUE(renderer) << renderer.error().what;
+  FrameInput input{{0, 0, 1}, {}, 0};
+  const auto draw_all = [&] {
+    for (input.level = 0; input.level < levels.size(); ++input.level) {
+      for (input.next_level = 0; input.next_level < levels.size(); ++input.next_level) {
+        for (const double fade : {0.0, 0.3, 1.0}) {
+          input.fade = fade;
+          (*renderer)->draw(input);
+          static_cast<void>((*renderer)->statistics());
+        }
+      }
+    }
+  };
+  draw_all();
+  const std::size_t before = allocations;
+  draw_all();
+  EXPECT_EQ(allocations, before);
+}
+
 // What draw_to_scanout() does, into a texture in place of a display's buffer.
 TEST(RendererAllocation, ScanningOutDoesNotAllocateOnceWarm) {
   const auto context = EglContext::create();

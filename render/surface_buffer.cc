@@ -94,9 +94,12 @@ void SurfaceBuffer::assign(GLuint program, GLuint first_unit) {
   auto unit = static_cast<GLint>(first_unit);
   for (const char* sampler : {"SurfacePlaces", "SurfaceFrames", "SurfaceDepth"})
     glProgramUniform1i(program, glGetUniformLocation(program, sampler), unit++);
+  nearest_ = glGetUniformLocation(program, "nearest");
 }
 
-void SurfaceBuffer::evaluate(GLuint framebuffer) const {
+void SurfaceBuffer::evaluate(GLuint framebuffer, bool masked) const {
+  // No depth is more than 1, and of a fragment it is 1 in the near plane alone.
+  glUniform1f(nearest_, masked ? 1.0F : 2.0F);
   GLuint unit = first_unit_;
   for (const GlTexture* texture : {&places_, &frames_, &depth_})
     glBindTextureUnit(unit++, texture->id());

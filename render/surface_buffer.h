@@ -32,7 +32,8 @@ class SurfaceBuffer {
   void assign(GLuint program, GLuint first_unit);
   /// Runs it, which must be in use, for every pixel; the result goes to the colour attachment of
   /// `framebuffer`.
-  void evaluate(GLuint framebuffer) const;
+  /// @param masked  whether begin() was followed by a FadeMask, of which only the part is written.
+  void evaluate(GLuint framebuffer, bool masked) const;
   [[nodiscard]] std::size_t gpu_bytes() const;
 
  private:
@@ -40,6 +41,7 @@ class SurfaceBuffer {
   int width_;
   int height_;
   GLuint first_unit_ = 0;
+  GLint nearest_ = -1;
   GlTexture places_;
   GlTexture frames_;
   GlTexture depth_;
