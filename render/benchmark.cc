@@ -16,15 +16,19 @@
 #include "base/statistics.h"
 #include "render/compensate_pass.h"
 #include "render/draw_pass.h"
+#include "render/draw_target.h"
+#include "render/drawing.h"
 #include "render/egl_context.h"
 #include "render/screen_error.h"
+#include "render/upsample_pass.h"
 
 namespace veneer::render {
 namespace {
 
 using Eigen::Vector3d;
 
-constexpr int kPlainTexels = 256;  // along a side of the plain texture
+constexpr std::size_t kTargetBytes = 8 + 4;  // of a pixel, with depth
+constexpr int kPlainTexels = 256;            // along a side of the plain texture
 constexpr int kWarmUpFrames = 2;
 // Frames and pixels that are compared with the set: enough for an epsilon steady to about a
 // percent.
@@ -108,10 +112,12 @@ btf::ModelShader plain_textures() {
   return shader;
 }
 
-// One thing to time: a draw, or the compensation of what was drawn before it.
+// One thing to time: a draw, with what brings it to the whole raster where it is on a smaller one;
+// this alone; or the compensation of what was drawn before it.
 struct Entrant {
   RenderTiming timing;
   std::optional<DrawPass> pass;
+  std::optional<DrawTarget> smaller;
   std::optional<CompensatePass> compensate;
   std::vector<double> query_ms;
   std::vector<double> finish_ms;
@@ -121,21 +127,30 @@ class Bench {
  public:
   static Result<Bench> create(EglContext context, const RenderBenchOptions& options) {
     const calibration::ProjectorProfile profile = bench_profile(options.width, options.height);
-    Bench bench(std::move(context), profile, options.texels_per_pixel);
+    VENEER_ASSIGN(DrawTarget target, DrawTarget::create({options.width, options.height}));
+    VENEER_ASSIGN(UpsamplePass upsample, UpsamplePass::create());
+    Bench bench(std::move(context),
+                profile,
+                options.texels_per_pixel,
+                std::move(target),
+                std::move(upsample));
     const btf::ModelShader plain = plain_textures();
     VENEER_TRY(bench.add(
         "plain",
         plain,
         DrawPass::create_plain(plain, kLight, bench.repeats(kPlainTexels, kPlainTexels), profile)));
-    for (const auto& [name, material, cache, average_texels, evaluation] : options.materials) {
+    for (const auto& [name, material, cache, average_texels, evaluation, scale] :
+         options.materials) {
       const btf::ModelShader shader = material->shader();
       const Eigen::Vector2d repeats = bench.repeats(material->width(), material->height());
       const DrawOptions draw{.cache = cache,
                              .filter = texel_filter(*material, average_texels),
-                             .evaluation = evaluation};
+                             .evaluation = evaluation,
+                             .scale = scale};
       VENEER_TRY(
           bench.add(name, shader, DrawPass::create(shader, {kLight}, repeats, profile, draw)));
     }
+    VENEER_TRY(bench.add_interpolations());
     VENEER_TRY(bench.add_compensation("compensation", profile));
     calibration::ProjectorProfile with_segment = profile;
     with_segment.residual = calibration::ColourResidual::sampled(
@@ -157,19 +172,18 @@ class Bench {
   }
 
  private:
-  Bench(EglContext context, calibration::ProjectorProfile profile, double texels_per_pixel)
+  Bench(EglContext context,
+        calibration::ProjectorProfile profile,
+        double texels_per_pixel,
+        DrawTarget target,
+        UpsamplePass upsample)
       : context_(std::move(context)),
         texels_per_pixel_(texels_per_pixel),
         profile_(std::move(profile)),
         mesh_(frame_filling_mesh(profile_.geometry)),
-        target_(make_texture_2d(GL_RGBA16F, profile_.geometry.width, profile_.geometry.height)),
-        depth_(make_texture_2d(
-            GL_DEPTH_COMPONENT32F, profile_.geometry.width, profile_.geometry.height)),
-        framebuffer_(make_framebuffer()),
-        query_(make_query(GL_TIME_ELAPSED)) {
-    glNamedFramebufferTexture(framebuffer_.id(), GL_COLOR_ATTACHMENT0, target_.id(), 0);
-    glNamedFramebufferTexture(framebuffer_.id(), GL_DEPTH_ATTACHMENT, depth_.id(), 0);
-  }
+        target_(std::move(target)),
+        upsample_(std::move(upsample)),
+        query_(make_query(GL_TIME_ELAPSED)) {}
 
   // As many repeats as it takes to lay the material side by side.
   [[nodiscard]] Eigen::Vector2d repeats(int width, int height) const {
@@ -191,6 +205,30 @@ class Bench {
     }
     if (const SurfaceBuffer* surface = entrant.pass->surface())
       entrant.timing.gpu_bytes += surface->gpu_bytes();
+    return add_smaller(entrant, entrant.pass->raster());
+  }
+
+  // What an entrant draws on, where it is not the whole raster.
+  Status add_smaller(Entrant& entrant, const Eigen::Vector2i& raster) {
+    if (raster == target_.size()) return {};
+    VENEER_ASSIGN(DrawTarget smaller, DrawTarget::create(raster));
+    entrant.smaller = std::move(smaller);
+    entrant.timing.gpu_bytes += kTargetBytes * static_cast<std::size_t>(raster.prod());
+    return {};
+  }
+
+  // One for each raster that is smaller.
+  Status add_interpolations() {
+    std::vector<Eigen::Vector2i> rasters;
+    for (const Entrant& entrant : entrants_) {
+      if (entrant.smaller && std::ranges::find(rasters, entrant.smaller->size()) == rasters.end())
+        rasters.push_back(entrant.smaller->size());
+    }
+    for (const Eigen::Vector2i& raster : rasters) {
+      Entrant& entrant = entrants_.emplace_back();
+      entrant.timing.name = fmt::format("interpolation from {}x{}", raster.x(), raster.y());
+      VENEER_TRY(add_smaller(entrant, raster));
+    }
     return {};
   }
 
@@ -231,8 +269,8 @@ class Bench {
       const std::vector<Vector3d> reference = reference_at(set, queries);
       for (std::size_t e = 1; e < entrants_.size(); ++e) {
         if (!entrants_[e].pass) continue;
-        entrants_[e].pass->draw(framebuffer_.id(), mesh_, input);
-        glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.id());
+        draw(entrants_[e], input);
+        glBindFramebuffer(GL_READ_FRAMEBUFFER, target_.framebuffer());
         glPixelStorei(GL_PACK_ALIGNMENT, 4);
         glPixelStorei(GL_PACK_ROW_LENGTH, 0);
         glReadPixels(0,
@@ -255,15 +293,21 @@ class Bench {
     return {};
   }
 
+  void draw(const Entrant& entrant, const DrawInput& input) const {
+    const DrawTarget& drawn = entrant.smaller ? *entrant.smaller : target_;
+    if (entrant.pass) entrant.pass->draw(drawn.framebuffer(), mesh_, input);
+    if (entrant.smaller) upsample_.run(drawn, target_);
+  }
+
   void time(Entrant& entrant, int frame) {
     const DrawInput input = input_of(frame);
     glFinish();
     const auto start = std::chrono::steady_clock::now();
     glBeginQuery(GL_TIME_ELAPSED, query_.id());
-    if (entrant.pass) {
-      entrant.pass->draw(framebuffer_.id(), mesh_, input);
+    if (entrant.compensate) {
+      entrant.compensate->run(target_.colour(), static_cast<std::uint32_t>(frame));
     } else {
-      entrant.compensate->run(target_.id(), static_cast<std::uint32_t>(frame));
+      draw(entrant, input);
     }
     glEndQuery(GL_TIME_ELAPSED);
     glFinish();
@@ -308,9 +352,8 @@ class Bench {
   double texels_per_pixel_;
   calibration::ProjectorProfile profile_;
   MeshBuffers mesh_;
-  GlTexture target_;
-  GlTexture depth_;
-  GlFramebuffer framebuffer_;
+  DrawTarget target_;
+  UpsamplePass upsample_;
   GlQuery query_;
   std::vector<Entrant> entrants_;
 };
@@ -329,6 +372,10 @@ Status RenderBenchOptions::check() const {
     return fail(Errc::kInvalidOption,
                 "timing: {} texels a pixel; 0.0625 to 16 can be drawn",
                 texels_per_pixel);
+  for (const RenderBenchMaterial& m : materials) {
+    if (const Status status = DrawingOptions{.scale = m.scale}.check(); !status)
+      return fail_while(fmt::format("timing {}", m.name), status.error());
+  }
   if (reference_rays < 1 || reference_rays > 32)
     return fail(Errc::kInvalidOption,
                 "timing: {} rays along a pixel's side; 1 to 32 can be compared",
