@@ -72,6 +72,8 @@ Result<Config> Config::read(TomlReader& toml) {
   render.read("geometry_floor", config.render.geometry_floor);
   check_range(render, "geometry_floor", config.render.geometry_floor, 1e-6, 1);
   render.read("average_texels", config.drawing.average_texels);
+  render.read("scale", config.drawing.scale);
+  check_range(render, "scale", config.drawing.scale, render::DrawingOptions::kLeastScale, 1);
   std::string evaluation = "fragment";
   render.read("evaluation", evaluation);
   if (const auto parsed = render::parse_evaluation(evaluation)) {

@@ -29,7 +29,7 @@ TEST(Config, ReadsEveryKey) {
   ASSERT_TRUE(
       read("clock = \"virtual\"\nframes = 12\nframe_rate_hz = 50\ndisplay_latency_ms = 30\n"
            "summary = \"s.json\"\n[render]\ncompensate = false\ndither = false\n"
-           "geometry_floor = 0.1\naverage_texels = true\nevaluation = "
+           "geometry_floor = 0.1\naverage_texels = true\nscale = 0.5\nevaluation = "
            "\"compute\"\ncache_spacing_px = 16\ncache_most_turn = "
            "0.2\n[prediction]\nhorizon_s = 0.1\n",
            &config));
@@ -39,6 +39,7 @@ TEST(Config, ReadsEveryKey) {
   EXPECT_FALSE(config.render.compensate);
   EXPECT_EQ(config.render.geometry_floor, 0.1);
   EXPECT_TRUE(config.drawing.average_texels);
+  EXPECT_EQ(config.drawing.scale, 0.5);
   EXPECT_EQ(config.drawing.evaluation, render::Evaluation::kCompute);
   EXPECT_EQ(config.drawing.cache.spacing, 16);
   EXPECT_EQ(config.drawing.cache.most_turn, 0.2);
@@ -55,6 +56,9 @@ TEST(Config, RefusesWhatMakesNoSense) {
                            "[render]\ngeometry_floor = 0",
                            "[render]\ncache_spacing_px = 2",
                            "[render]\ncompensation = true",
+                           "[render]\nscale = 0.2",
+                           "[render]\nscale = nan",
+                           "[render]\nscale = 1.5",
                            "[render]\nevaluation = \"cpu\"",
                            "[prediction]\nhorizon_s = -1"}) {
     const Status status = read(line);

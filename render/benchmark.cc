@@ -12,17 +12,21 @@
 
 #include "render/compensate_pass.h"
 #include "render/draw_pass.h"
+#include "render/draw_target.h"
+#include "render/drawing.h"
 #include "render/egl_context.h"
 #include "render/level_draws.h"
 #include "render/scene_check.h"
 #include "render/screen_error.h"
 #include "render/turns.h"
+#include "render/upsample_pass.h"
 
 namespace veneer::render {
 namespace {
 
 using Eigen::Vector3d;
 
+constexpr std::size_t kTargetBytes = 8 + 4;  // of a pixel, with depth
 // Frames and pixels that are compared with the set: enough for an epsilon steady to about a
 // percent.
 constexpr int kComparedFrames = 3;
@@ -85,10 +89,12 @@ Mesh frame_filling_mesh(const calibration::ProjectorGeometry& g) {
   return mesh;
 }
 
-// One thing to time: a draw, or the compensation of what was drawn before it.
+// One thing to time: a draw, with what brings it to the whole raster where it is on a smaller one;
+// this alone; or the compensation of what was drawn before it.
 struct Entrant {
   RenderTiming timing;
   std::optional<DrawPass> pass;
+  std::optional<DrawTarget> smaller;
   std::optional<CompensatePass> compensate;
 };
 
@@ -97,21 +103,29 @@ class Bench {
   static Result<Bench> create(EglContext context, const RenderBenchOptions& options) {
     const calibration::ProjectorProfile profile = bench_profile(options.width, options.height);
     VENEER_ASSIGN(DrawTarget target, DrawTarget::create({options.width, options.height}));
-    Bench bench(std::move(context), profile, options.texels_per_pixel, std::move(target));
+    VENEER_ASSIGN(UpsamplePass upsample, UpsamplePass::create());
+    Bench bench(std::move(context),
+                profile,
+                options.texels_per_pixel,
+                std::move(target),
+                std::move(upsample));
     const btf::ModelShader plain = plain_textures();
     VENEER_TRY(bench.add("plain",
                          plain,
                          DrawPass::create_plain(
                              plain, {kLight}, bench.repeats(kPlainTexels, kPlainTexels), profile)));
-    for (const auto& [name, material, cache, average_texels, evaluation] : options.materials) {
+    for (const auto& [name, material, cache, average_texels, evaluation, scale] :
+         options.materials) {
       const btf::ModelShader shader = material->shader();
       const Eigen::Vector2d repeats = bench.repeats(material->width(), material->height());
       const DrawOptions draw{.cache = cache,
                              .filter = texel_filter(*material, average_texels),
-                             .evaluation = evaluation};
+                             .evaluation = evaluation,
+                             .scale = scale};
       VENEER_TRY(
           bench.add(name, shader, DrawPass::create(shader, {kLight}, repeats, profile, draw)));
     }
+    VENEER_TRY(bench.add_interpolations());
     VENEER_TRY(bench.add_compensation("compensation", profile));
     calibration::ProjectorProfile with_segment = profile;
     with_segment.residual = calibration::ColourResidual::sampled(
@@ -139,12 +153,14 @@ class Bench {
   Bench(EglContext context,
         calibration::ProjectorProfile profile,
         double texels_per_pixel,
-        DrawTarget target)
+        DrawTarget target,
+        UpsamplePass upsample)
       : context_(std::move(context)),
         texels_per_pixel_(texels_per_pixel),
         profile_(std::move(profile)),
         mesh_(frame_filling_mesh(profile_.geometry)),
-        target_(std::move(target)) {}
+        target_(std::move(target)),
+        upsample_(std::move(upsample)) {}
 
   // As many repeats as it takes to lay the material side by side.
   [[nodiscard]] Eigen::Vector2d repeats(int width, int height) const {
@@ -158,6 +174,30 @@ class Bench {
     Entrant& entrant = entrants_.emplace_back();
     entrant.timing = timing_of(name, shader, *pass);
     entrant.pass = std::move(*pass);
+    return add_smaller(entrant, entrant.pass->raster());
+  }
+
+  // What an entrant draws on, where it is not the whole raster.
+  Status add_smaller(Entrant& entrant, const Eigen::Vector2i& raster) {
+    if (raster == target_.size()) return {};
+    VENEER_ASSIGN(DrawTarget smaller, DrawTarget::create(raster));
+    entrant.smaller = std::move(smaller);
+    entrant.timing.gpu_bytes += kTargetBytes * static_cast<std::size_t>(raster.prod());
+    return {};
+  }
+
+  // One for each raster that is smaller.
+  Status add_interpolations() {
+    std::vector<Eigen::Vector2i> rasters;
+    for (const Entrant& entrant : entrants_) {
+      if (entrant.smaller && std::ranges::find(rasters, entrant.smaller->size()) == rasters.end())
+        rasters.push_back(entrant.smaller->size());
+    }
+    for (const Eigen::Vector2i& raster : rasters) {
+      Entrant& entrant = entrants_.emplace_back();
+      entrant.timing.name = fmt::format("interpolation from {}x{}", raster.x(), raster.y());
+      VENEER_TRY(add_smaller(entrant, raster));
+    }
     return {};
   }
 
@@ -197,7 +237,7 @@ class Bench {
       const std::vector<Vector3d> reference = reference_at(set, screen.queries);
       for (std::size_t e = 1; e < entrants_.size(); ++e) {
         if (!entrants_[e].pass) continue;
-        entrants_[e].pass->draw(target_.framebuffer(), mesh_, input);
+        draw(entrants_[e], input);
         glBindFramebuffer(GL_READ_FRAMEBUFFER, target_.framebuffer());
         glPixelStorei(GL_PACK_ALIGNMENT, 4);
         glPixelStorei(GL_PACK_ROW_LENGTH, 0);
@@ -221,11 +261,17 @@ class Bench {
     return {};
   }
 
+  void draw(const Entrant& entrant, const DrawInput& input) const {
+    const DrawTarget& drawn = entrant.smaller ? *entrant.smaller : target_;
+    if (entrant.pass) entrant.pass->draw(drawn.framebuffer(), mesh_, input);
+    if (entrant.smaller) upsample_.run(drawn, target_);
+  }
+
   void draw(Entrant& entrant, int frame) {
-    if (entrant.pass) {
-      entrant.pass->draw(target_.framebuffer(), mesh_, input_of(frame));
-    } else {
+    if (entrant.compensate) {
       entrant.compensate->run(target_.colour(), static_cast<std::uint32_t>(frame));
+    } else {
+      draw(entrant, input_of(frame));
     }
   }
 
@@ -243,6 +289,7 @@ class Bench {
   calibration::ProjectorProfile profile_;
   MeshBuffers mesh_;
   DrawTarget target_;
+  UpsamplePass upsample_;
   std::vector<Entrant> entrants_;
 };
 
@@ -272,6 +319,10 @@ Status RenderBenchOptions::check() const {
     return fail(Errc::kInvalidOption,
                 "timing: {} texels a pixel; 0.0625 to 16 can be drawn",
                 texels_per_pixel);
+  for (const RenderBenchMaterial& m : materials) {
+    if (const Status status = DrawingOptions{.scale = m.scale}.check(); !status)
+      return fail_while(fmt::format("timing {}", m.name), status.error());
+  }
   if (reference_rays < 1 || reference_rays > 32)
     return fail(Errc::kInvalidOption,
                 "timing: {} rays along a pixel's side; 1 to 32 can be compared",

@@ -28,6 +28,7 @@ struct RenderBenchMaterial {
   AngularCacheOptions cache{};
   bool average_texels = false;  ///< as RendererOptions has it
   Evaluation evaluation = Evaluation::kFragment;
+  double scale = 1;  ///< as DrawingOptions has it; below 1, interpolation is part of the time
 };
 
 struct RenderBenchOptions {
@@ -66,6 +67,7 @@ struct RenderBenchResult {
   std::string renderer;  ///< GL renderer and version
   std::string clock;     ///< what measured: "GL timer query" or "steady clock around glFinish"
   std::vector<RenderTiming> timings;  ///< "plain" first, then the materials in order, then
+                                      ///< "interpolation from WxH" for every smaller raster, then
                                       ///< "compensation" and "compensation with residual"
 };
 
@@ -74,7 +76,8 @@ struct RenderBenchResult {
 /// same mesh, interpolants and target, one filtered fetch times the light's cosine. All draws take
 /// turns within every frame, so that a change in the machine's load hits all alike. "compensation"
 /// is the full-screen pass that follows a draw in the renderer (with its counters), once for a
-/// profile without and once for one with a colour residual; no material's figure contains it. The
+/// profile without and once for one with a colour residual; no material's figure contains it.
+/// "Interpolation" is what brings the target of a smaller raster onto the whole one. The
 /// GL timer query is used where it is plausible, else glFinish and the clock. Errors:
 /// kInvalidOption, kUnavailable (no GL 4.5).
 [[nodiscard]] Result<RenderBenchResult> bench_render(const RenderBenchOptions& options,

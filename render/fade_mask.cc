@@ -34,6 +34,7 @@ Result<FadeMask> FadeMask::create() {
   mask.is_next_ = glGetUniformLocation(program, "part_is_next");
   mask.pixels_ = glGetUniformLocation(program, "pixels");
   mask.reach_ = glGetUniformLocation(program, "reach");
+  mask.corners_ = glGetUniformLocation(program, "corners");
   mask.no_vertices_ = make_vertex_array();
   return mask;
 }
@@ -44,6 +45,7 @@ void FadeMask::write(const FadePart& part, const Raster& raster) const {
   glProgramUniform1i(program, is_next_, part.is_next ? 1 : 0);
   glProgramUniform2f(program, pixels_, raster.pixels.x(), raster.pixels.y());
   glProgramUniform2f(program, reach_, raster.reach.x(), raster.reach.y());
+  glProgramUniform1i(program, corners_, raster.reach.isZero(0.0F) ? 1 : 4);
   glUseProgram(program);
   glViewport(0, 0, raster.size.x(), raster.size.y());
   glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);

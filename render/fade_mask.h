@@ -51,6 +51,7 @@ class FadeMask {
   GLint is_next_ = -1;
   GLint pixels_ = -1;
   GLint reach_ = -1;
+  GLint corners_ = -1;
 };
 
 /// What keeps a draw to its part.

@@ -52,9 +52,11 @@ struct FrameInput {
   /// all; without effect where the two are the same. In between, tiles of the picture go over one
   /// after another, each once and far from the one before, and only one of the two levels is shaded
   /// in each: whoever changes levels because time is short has none for drawing both, which a mix
-  /// of the two would need. What a level does for the whole frame (transforming vertices, filling
-  /// the angular cache, reading what a compute pass evaluates) is done for both; where their scales
-  /// differ, the smaller is drawn a pixel beyond its tiles.
+  /// of the two would need. A tile shows its whole difference at once, so many frames make the
+  /// steps rarer, not smaller. What a level does for the whole frame (transforming vertices,
+  /// filling the angular cache, reading what a compute pass evaluates) is done for both, and the
+  /// tiles are marked once for each; where their scales differ, the smaller is drawn a pixel beyond
+  /// its tiles.
   std::size_t next_level = 0;
   double fade = 0.0;
 };

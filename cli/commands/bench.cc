@@ -50,6 +50,9 @@ Result<int> run_bench(CommandLine& line) {
                  evaluation,
                  "render: compute times each evaluated in a compute pass too; fragment does not")
       ->capture_default_str();
+  app.add_option(
+         "--scale", render.scale, "render: time each on a raster this much smaller too, 0.25 to 1")
+      ->capture_default_str();
   app.add_option("--cache",
                  render.cache.spacing,
                  "render: time each with an angular cache too, so many pixels between nodes");

@@ -72,6 +72,11 @@ void add(const std::string& name,
     if (average && !options.average) break;
     const std::string shown = average ? name + " averaged" : name;
     materials.push_back({shown, material, {}, average});
+    if (options.scale != 1)
+      materials.push_back({.name = fmt::format("{} scale {}", shown, options.scale),
+                           .material = material,
+                           .average_texels = average,
+                           .scale = options.scale});
     if (cached) materials.push_back({shown + " cached", material, options.cache, average});
     if (compute)
       materials.push_back(

@@ -24,6 +24,7 @@ struct BenchRenderOptions {
   bool average = false;  ///< times everything with averaged texels too
   /// kCompute times everything evaluated in a compute pass too.
   render::Evaluation evaluation = render::Evaluation::kFragment;
+  double scale = 1;  ///< below 1, times everything on a raster this much smaller too
   /// With a spacing, whatever offers a cache is timed with it too.
   render::AngularCacheOptions cache;
 };
