@@ -121,7 +121,7 @@ TEST(AngularGrid, ComesCloserToTheReferenceWithMoreNodes) {
 
 TEST(AngularGrid, OneViewNeedsOneNode) {
   const AngularGrid grid({direction_from_angles({0.3, 1.0})}, DirectionRole::kView, 16);
-  EXPECT_EQ(grid.nodes(), 1);
+  EXPECT_EQ(grid.shape().count(), 1);
   EXPECT_EQ(drawn(grid, Eigen::VectorXf::Constant(1, 0.25F), Direction::UnitX()), 0.25);
 }
 

@@ -8,6 +8,8 @@
 namespace veneer::btf {
 namespace {
 
+GridShape square(int nodes) { return {{}, nodes, nodes}; }
+
 constexpr int kMostSide = 2048;  // of a volume, in every GL 4.5
 
 TEST(ClusterVolume, GivesEveryPairOfNodesATexelOfItsOwnWithinWhatGpusTake) {
@@ -19,10 +21,10 @@ TEST(ClusterVolume, GivesEveryPairOfNodesATexelOfItsOwnWithinWhatGpusTake) {
                                                 Case{3, 5, 4, 2},
                                                 Case{32, 8, 4, 8},
                                                 Case{256, 32, 4, 2}}) {
-    const ClusterVolume volume(clusters, a, b, storeys);
+    const ClusterVolume volume(clusters, square(a), square(b), storeys);
     EXPECT_LE(volume.width(), kMostSide);
     EXPECT_LE(volume.height(), kMostSide);
-    EXPECT_EQ(volume.depth(), b * b);
+    EXPECT_EQ(volume.depth(), a == 1 ? 1 : b * b);
     std::vector<bool> taken(volume.texel_count());
     for (int k = 0; k < clusters; ++k)
       for (int s = 0; s < storeys; ++s)
@@ -38,7 +40,7 @@ TEST(ClusterVolume, GivesEveryPairOfNodesATexelOfItsOwnWithinWhatGpusTake) {
 
 // The filter must find a function's neighbouring nodes in neighbouring texels.
 TEST(ClusterVolume, KeepsNeighboursTogether) {
-  const ClusterVolume volume(40, 6, 5, 2);
+  const ClusterVolume volume(40, square(6), square(5), 2);
   const auto width = static_cast<std::size_t>(volume.width());
   const std::size_t slice = width * static_cast<std::size_t>(volume.height());
   for (const int k : {0, 7, 39}) {
@@ -49,7 +51,7 @@ TEST(ClusterVolume, KeepsNeighboursTogether) {
 }
 
 TEST(ClusterVolume, EvenTheLargestMaterialFitsInItsSides) {
-  const ClusterVolume volume(256, 32, 32, 16);
+  const ClusterVolume volume(256, square(32), square(32), 16);
   EXPECT_LE(volume.width(), kMostSide);
   EXPECT_LE(volume.height(), kMostSide);
   EXPECT_LE(volume.depth(), kMostSide);
