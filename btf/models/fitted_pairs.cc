@@ -91,6 +91,12 @@ std::vector<float> FittedPairs::column_weights(int channels) const {
   return columns;
 }
 
+std::vector<float> FittedPairs::weights_everywhere() const {
+  std::vector<float> weights = weights_;
+  for (float& weight : weights) weight = std::max(weight, 1e-6F);
+  return weights;
+}
+
 Eigen::ArrayXf FittedPairs::all_weights() const {
   if (weights_.empty()) return Eigen::ArrayXf::Ones(frame_.pair_count());
   return Eigen::Map<const Eigen::ArrayXf>(weights_.data(), frame_.pair_count());

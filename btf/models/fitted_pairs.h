@@ -24,6 +24,9 @@ class FittedPairs {
   [[nodiscard]] std::span<const float> weights() const { return weights_; }
   /// Of `channels` columns for each pair; empty as weights() are.
   [[nodiscard]] std::vector<float> column_weights(int channels) const;
+  /// weights() for formulas that are fitted to every texel, or empty: pairs without weight count a
+  /// millionth, so that a view or a light that nobody asks for still shows what it did.
+  [[nodiscard]] std::vector<float> weights_everywhere() const;
   /// weights(), written out.
   [[nodiscard]] Eigen::ArrayXf all_weights() const;
   /// As SampleSet::rgb(), at the pairs of the frame.
