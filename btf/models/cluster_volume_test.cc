@@ -38,6 +38,34 @@ TEST(ClusterVolume, GivesEveryPairOfNodesATexelOfItsOwnWithinWhatGpusTake) {
   }
 }
 
+// Grids of any sides, of which one may be a point or a line: then one fetch has all of them.
+TEST(ClusterVolume, TakesGridsOfAnySidesAndSaysHowManyFetchesTheyTake) {
+  struct Case {
+    GridShape views, lights;
+    int fetches;
+  };
+  for (const auto& [views, lights, fetches] : {Case{{{}, 3, 4}, {{}, 2, 5}, 2},
+                                               Case{{{}, 3, 4}, {{}, 1, 1}, 1},
+                                               Case{{{}, 3, 4}, {{}, 1, 6}, 1},
+                                               Case{{{}, 3, 4}, {{}, 6, 1}, 1},
+                                               Case{{{}, 1, 4}, {{}, 3, 3}, 2},
+                                               Case{{{}, 1, 1}, {{}, 3, 4}, 1},
+                                               Case{{{}, 1, 1}, {{}, 1, 1}, 1}}) {
+    const ClusterVolume volume(5, views, lights, 2);
+    EXPECT_EQ(volume.fetches(), fetches);
+    std::vector<bool> taken(volume.texel_count());
+    for (int k = 0; k < 5; ++k)
+      for (int s = 0; s < 2; ++s)
+        for (int v = 0; v < views.count(); ++v)
+          for (int l = 0; l < lights.count(); ++l) {
+            const std::size_t texel = volume.texel(k, s, v, l);
+            ASSERT_LT(texel, taken.size());
+            ASSERT_FALSE(taken[texel]);
+            taken[texel] = true;
+          }
+  }
+}
+
 // The filter must find a function's neighbouring nodes in neighbouring texels.
 TEST(ClusterVolume, KeepsNeighboursTogether) {
   const ClusterVolume volume(40, square(6), square(5), 2);

@@ -49,6 +49,7 @@ set(VENEER_MODEL_TESTS
   models/mip_levels_test.cc
   models/models_test.cc
   models/real_material_test.cc
+  models/region_test.cc
   models/revised_lpca/revised_lpca_test.cc)
 set(VENEER_MODEL_SHADERS
   models/cluster_volume.glsl
