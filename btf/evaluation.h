@@ -2,13 +2,14 @@
 #pragma once
 
 #include "base/progress.h"
+#include "btf/fit_region.h"
 #include "btf/material.h"
 #include "btf/sample_set.h"
 
 namespace veneer::btf {
 
-/// Error over all texels, pairs and channels. epsilon is the mean absolute difference (Meseth et
-/// al. 2003, section 4.1).
+/// Error over all texels, pairs and channels, each pair by its weight where there are such. epsilon
+/// is the mean absolute difference (Meseth et al. 2003, section 4.1).
 struct ImageError {
   double epsilon_avg{};
   double epsilon_min{};  ///< of the (view, light) image that is met best
@@ -33,10 +34,15 @@ struct Evaluation {
 };
 
 /// The same figures each time, on any number of threads. Of a polarised set the total is compared.
-/// Errors: kBadFormat where material and set differ in size or directions, or where one of them
-/// holds NaN or infinite values.
+/// A material that keeps some of the set's directions (FitOptions::region) is compared there.
+/// @param weights  how much each pair of the set counts, null: all of the material's alike. Of
+/// pairs without weight nothing is told.
+/// Errors: kBadFormat where the material has another size, directions that the set has not, or
+/// lacks some that have a weight, or where one of them holds NaN or infinite values;
+/// kInvalidOption of PairWeights::check().
 [[nodiscard]] Result<Evaluation> evaluate(const SampleSet& set,
                                           const Material& material,
-                                          Progress& progress);
+                                          Progress& progress,
+                                          const PairWeights* weights = nullptr);
 
 }  // namespace veneer::btf

@@ -20,4 +20,24 @@ Status PairWeights::check(const SampleSetInfo& info) const {
   return {};
 }
 
+Status DirectionBox::check(std::string_view what) const {
+  // Written so that NaN is refused too.
+  if (u_min >= 0 && u_min <= u_max && u_max <= 1 && v_min >= 0 && v_min <= v_max && v_max <= 1)
+    return {};
+  return fail(Errc::kInvalidOption,
+              "restricting a fit: the box of the {} is {} to {} by {} to {}; both must ascend "
+              "within 0 to 1",
+              what,
+              u_min,
+              u_max,
+              v_min,
+              v_max);
+}
+
+Status FitRegion::check(const SampleSetInfo& info) const {
+  VENEER_TRY(views.check("views"));
+  VENEER_TRY(lights.check("lights"));
+  return weights.weight.empty() ? Status() : weights.check(info);
+}
+
 }  // namespace veneer::btf

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string_view>
 #include <vector>
 
 #include "base/result.h"
@@ -24,14 +25,23 @@ struct DirectionBox {
   double u_min = 0, u_max = 1;
   double v_min = 0, v_max = 1;
   [[nodiscard]] bool is_all() const { return u_min <= 0 && u_max >= 1 && v_min <= 0 && v_max >= 1; }
+  /// Errors: kInvalidOption, naming `what`, where it is no box on the square.
+  [[nodiscard]] Status check(std::string_view what) const;
 };
 
 /// What a scene can ask of a material; FitOptions::region. A fit puts its nodes there, and is only
 /// bound to be right there; outside, what is drawn is that of the nearest border.
+///
+/// Of the set's directions a material then keeps those with a weight and those that a box is
+/// interpolated from (without weights: the latter alone); its views() and lights() are these.
+/// Errors are squared and weighted over the pairs of the two; what pairs without weight show
+/// follows from the others. Only ratios of weights matter; one under 1e-8 of the largest is none.
 struct FitRegion {
   PairWeights weights;  ///< empty: all pairs alike
   DirectionBox views;
   DirectionBox lights;
+  /// Errors: kInvalidOption, of its parts.
+  [[nodiscard]] Status check(const SampleSetInfo& info) const;
 };
 
 }  // namespace veneer::btf

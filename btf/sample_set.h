@@ -56,6 +56,8 @@ class SampleSet {
   /// does not have is a bug of the caller.
   /// @param out  pair_count() * 3 floats.
   void rgb(int texel, Part part, std::span<float> out) const;
+  /// The same of some pairs, numbered view * lights + light. @param out  3 floats each.
+  void rgb(int texel, Part part, std::span<const int> pairs, std::span<float> out) const;
   /// Looks at every sample once. Errors: kBadFormat where one is NaN or infinite, with the texel
   /// and pair of the first and how many there are. Fits call it before they start.
   [[nodiscard]] Status check_finite() const;

@@ -59,10 +59,13 @@ std::string TexelPyramid::glsl() const {
          (levels_ > 1 ? kTexelOfLevelGlsl : kTexelAtGlsl);
 }
 
-void pyramid_rgb(
-    const SampleSet& set, const TexelPyramid& pyramid, int texel, Part part, std::span<float> out) {
+namespace {
+
+// @param read  read(texel of the sample, out).
+template <class Read>
+void average(const TexelPyramid& pyramid, int texel, std::span<float> out, const Read& read) {
   const int level = pyramid.level_of(texel);
-  if (level == 0) return set.rgb(texel, part, out);
+  if (level == 0) return read(texel, out);
   const int columns = pyramid.width(level);
   const int rows = pyramid.height(level);
   const int x = (texel - pyramid.first(level)) % columns;
@@ -76,9 +79,27 @@ void pyramid_rgb(
     for (int i = x * width / columns; i * columns < (x + 1) * width; ++i) {
       const float share =
           static_cast<float>(overlap(i, x, columns, width) * overlap(j, y, rows, height)) / whole;
-      set.rgb(j * width + i, part, rgb);
+      read(j * width + i, std::span(rgb));
       for (std::size_t k = 0; k < out.size(); ++k) out[k] += share * rgb[k];
     }
+}
+
+}  // namespace
+
+void pyramid_rgb(
+    const SampleSet& set, const TexelPyramid& pyramid, int texel, Part part, std::span<float> out) {
+  average(pyramid, texel, out, [&](int of, std::span<float> values) { set.rgb(of, part, values); });
+}
+
+void pyramid_rgb(const SampleSet& set,
+                 const TexelPyramid& pyramid,
+                 int texel,
+                 Part part,
+                 std::span<const int> pairs,
+                 std::span<float> out) {
+  average(pyramid, texel, out, [&](int of, std::span<float> values) {
+    set.rgb(of, part, pairs, values);
+  });
 }
 
 }  // namespace veneer::btf

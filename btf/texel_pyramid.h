@@ -48,5 +48,12 @@ class TexelPyramid {
 /// shares count in each by area.
 void pyramid_rgb(
     const SampleSet& set, const TexelPyramid& pyramid, int texel, Part part, std::span<float> out);
+/// The same of some pairs.
+void pyramid_rgb(const SampleSet& set,
+                 const TexelPyramid& pyramid,
+                 int texel,
+                 Part part,
+                 std::span<const int> pairs,
+                 std::span<float> out);
 
 }  // namespace veneer::btf

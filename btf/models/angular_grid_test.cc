@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 
 #include "btf/elevated_concentric.h"
 #include "btf/internal_test_sets.h"
@@ -119,9 +120,62 @@ TEST(AngularGrid, ComesCloserToTheReferenceWithMoreNodes) {
   }
 }
 
+TEST(AngularGrid, ABoxHasTheDensityOfTheWholeAndOneNodeWhereItIsAPoint) {
+  const DirectionSet all = bonn_directions();
+  const auto shape = [&](const DirectionBox& box) {
+    const GridShape of = GridShape::of(all, DirectionRole::kLight, box, 16);
+    return std::pair{of.columns, of.rows};
+  };
+  EXPECT_EQ(shape({}), std::pair(16, 16));
+  EXPECT_EQ(shape({0.0, 0.5, 0.25, 0.5}), std::pair(8, 4));
+  EXPECT_EQ(shape({0.2, 0.201, 0.3, 0.31}), std::pair(1, 2));
+  EXPECT_EQ(shape({0.4, 0.4, 0.7, 0.7}), std::pair(1, 1));
+}
+
+TEST(AngularGrid, APointHasTheReferencesValueThereWhateverIsAsked) {
+  const DirectionSet directions = bonn_directions();
+  const SphericalInterpolator reference(directions, DirectionRole::kLight);
+  Eigen::VectorXf values(81);
+  for (int i = 0; i < 81; ++i) values[i] = 0.1F + 0.01F * static_cast<float>(i);
+  const Direction at = direction_from_angles({0.7, 2.0});
+  const Eigen::Vector2d st = square_from_direction(at);
+  const AngularGrid grid(
+      directions,
+      DirectionRole::kLight,
+      GridShape::of(directions, DirectionRole::kLight, {st.x(), st.x(), st.y(), st.y()}, 16));
+  EXPECT_EQ(grid.shape().count(), 1);
+  Pcg32 random(8);
+  for (int i = 0; i < 100; ++i)
+    EXPECT_NEAR(drawn(grid, values, random_direction(random, -0.1)),
+                interpolated(reference, values, at),
+                kFloatTolerance);
+}
+
+TEST(AngularGrid, WeightsInABoxSumToOneAndOutsideItAreThoseOfItsBorder) {
+  const DirectionSet directions = bonn_directions();
+  for (const DirectionBox& box : {DirectionBox{0.5, 0.8, 0.2, 0.6},
+                                  DirectionBox{0.5, 0.8, 0.4, 0.4},
+                                  DirectionBox{0.0, 1.0, 0.0, 0.3}}) {
+    const AngularGrid grid(
+        directions, DirectionRole::kView, GridShape::of(directions, DirectionRole::kView, box, 12));
+    EXPECT_TRUE(grid.fill().allFinite());
+    const Eigen::VectorXf ones = Eigen::VectorXf::Ones(81);
+    Pcg32 random(9);
+    for (int i = 0; i < 1000; ++i) {
+      const Direction d = random_direction(random, -0.1);
+      EXPECT_NEAR(drawn(grid, ones, d), 1.0, kFloatTolerance);
+      const GridWeights weights = grid.weights(d);
+      for (std::size_t j = 0; j < 4; ++j) {
+        EXPECT_GE(weights.weight[j], 0.0);
+        EXPECT_LT(weights.node[j], grid.shape().count());
+      }
+    }
+  }
+}
+
 TEST(AngularGrid, OneViewNeedsOneNode) {
   const AngularGrid grid({direction_from_angles({0.3, 1.0})}, DirectionRole::kView, 16);
-  EXPECT_EQ(grid.nodes(), 1);
+  EXPECT_EQ(grid.shape().count(), 1);
   EXPECT_EQ(drawn(grid, Eigen::VectorXf::Constant(1, 0.25F), Direction::UnitX()), 0.25);
 }
 

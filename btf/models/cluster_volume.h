@@ -5,6 +5,7 @@
 #include <string>
 
 #include "base/result.h"
+#include "btf/models/angular_grid.h"
 
 namespace veneer::btf {
 
@@ -14,17 +15,20 @@ namespace veneer::btf {
 ///
 /// A function takes view nodes in x and y and light nodes in z. Clusters stand side by side in x,
 /// as many as a power of two allows, and go on below; a cluster may have several functions, each of
-/// which has its own storey of all clusters in y.
+/// which has its own storey of all clusters in y. Where the views have one node, lights take its
+/// place and z has one. Where the nodes in z have one row or one column, as for a light that is
+/// fixed, the hardware interpolates all there is, and one fetch is enough.
 ///
 /// Source: Schneider 2004, "Real-time BTF Rendering", section 6.2.
 class ClusterVolume {
  public:
-  /// @param view_nodes, light_nodes  of a grid's side.
-  ClusterVolume(int clusters, int view_nodes, int light_nodes, int storeys);
+  ClusterVolume(int clusters, const GridShape& views, const GridShape& lights, int storeys);
   [[nodiscard]] int width() const { return width_; }    ///< texels
   [[nodiscard]] int height() const { return height_; }  ///< texels
-  [[nodiscard]] int depth() const { return light_nodes_ * light_nodes_; }
+  [[nodiscard]] int depth() const { return beyond().count(); }
   [[nodiscard]] std::size_t texel_count() const;
+  /// Of one function at one place, 1 or 2.
+  [[nodiscard]] int fetches() const { return beyond().columns > 1 && beyond().rows > 1 ? 2 : 1; }
   /// The texel of a pair of nodes, numbered as in AngularGrid.
   [[nodiscard]] std::size_t texel(int cluster, int storey, int view_node, int light_node) const;
   /// GLSL: the constants that cluster_volume.glsl reads.
@@ -35,8 +39,13 @@ class ClusterVolume {
   static constexpr std::size_t kMostBytes = std::size_t{2} << 30U;
 
  private:
-  int view_nodes_;
-  int light_nodes_;
+  [[nodiscard]] bool lights_in_plane() const { return views_.count() == 1; }
+  // The grid in x and y, and the one in z.
+  [[nodiscard]] const GridShape& plane() const { return lights_in_plane() ? lights_ : views_; }
+  [[nodiscard]] const GridShape& beyond() const { return lights_in_plane() ? views_ : lights_; }
+
+  GridShape views_;
+  GridShape lights_;
   int storeys_;
   int shift_ = 0;  // 2^shift clusters side by side
   int width_ = 0;

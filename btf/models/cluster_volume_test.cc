@@ -8,6 +8,8 @@
 namespace veneer::btf {
 namespace {
 
+GridShape square(int nodes) { return {{}, nodes, nodes}; }
+
 constexpr int kMostSide = 2048;  // of a volume, in every GL 4.5
 
 TEST(ClusterVolume, GivesEveryPairOfNodesATexelOfItsOwnWithinWhatGpusTake) {
@@ -19,10 +21,10 @@ TEST(ClusterVolume, GivesEveryPairOfNodesATexelOfItsOwnWithinWhatGpusTake) {
                                                 Case{3, 5, 4, 2},
                                                 Case{32, 8, 4, 8},
                                                 Case{256, 32, 4, 2}}) {
-    const ClusterVolume volume(clusters, a, b, storeys);
+    const ClusterVolume volume(clusters, square(a), square(b), storeys);
     EXPECT_LE(volume.width(), kMostSide);
     EXPECT_LE(volume.height(), kMostSide);
-    EXPECT_EQ(volume.depth(), b * b);
+    EXPECT_EQ(volume.depth(), a == 1 ? 1 : b * b);
     std::vector<bool> taken(volume.texel_count());
     for (int k = 0; k < clusters; ++k)
       for (int s = 0; s < storeys; ++s)
@@ -36,9 +38,37 @@ TEST(ClusterVolume, GivesEveryPairOfNodesATexelOfItsOwnWithinWhatGpusTake) {
   }
 }
 
+// Grids of any sides, of which one may be a point or a line: then one fetch has all of them.
+TEST(ClusterVolume, TakesGridsOfAnySidesAndSaysHowManyFetchesTheyTake) {
+  struct Case {
+    GridShape views, lights;
+    int fetches;
+  };
+  for (const auto& [views, lights, fetches] : {Case{{{}, 3, 4}, {{}, 2, 5}, 2},
+                                               Case{{{}, 3, 4}, {{}, 1, 1}, 1},
+                                               Case{{{}, 3, 4}, {{}, 1, 6}, 1},
+                                               Case{{{}, 3, 4}, {{}, 6, 1}, 1},
+                                               Case{{{}, 1, 4}, {{}, 3, 3}, 2},
+                                               Case{{{}, 1, 1}, {{}, 3, 4}, 1},
+                                               Case{{{}, 1, 1}, {{}, 1, 1}, 1}}) {
+    const ClusterVolume volume(5, views, lights, 2);
+    EXPECT_EQ(volume.fetches(), fetches);
+    std::vector<bool> taken(volume.texel_count());
+    for (int k = 0; k < 5; ++k)
+      for (int s = 0; s < 2; ++s)
+        for (int v = 0; v < views.count(); ++v)
+          for (int l = 0; l < lights.count(); ++l) {
+            const std::size_t texel = volume.texel(k, s, v, l);
+            ASSERT_LT(texel, taken.size());
+            ASSERT_FALSE(taken[texel]);
+            taken[texel] = true;
+          }
+  }
+}
+
 // The filter must find a function's neighbouring nodes in neighbouring texels.
 TEST(ClusterVolume, KeepsNeighboursTogether) {
-  const ClusterVolume volume(40, 6, 5, 2);
+  const ClusterVolume volume(40, square(6), square(5), 2);
   const auto width = static_cast<std::size_t>(volume.width());
   const std::size_t slice = width * static_cast<std::size_t>(volume.height());
   for (const int k : {0, 7, 39}) {
@@ -49,7 +79,7 @@ TEST(ClusterVolume, KeepsNeighboursTogether) {
 }
 
 TEST(ClusterVolume, EvenTheLargestMaterialFitsInItsSides) {
-  const ClusterVolume volume(256, 32, 32, 16);
+  const ClusterVolume volume(256, square(32), square(32), 16);
   EXPECT_LE(volume.width(), kMostSide);
   EXPECT_LE(volume.height(), kMostSide);
   EXPECT_LE(volume.depth(), kMostSide);

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "btf/models/weighted_pca.h"
+
 namespace veneer::btf {
 
 std::span<const Eigen::half> LpcaFactors::weights_of(int texel) const {
@@ -103,16 +105,18 @@ Status check_samples(const SampleSet& set, const FitOptions& options) {
 
 LpcaFactors fit_factors(const RowSource& source,
                         const std::vector<int>& components,
+                        std::span<const float> column_weights,
                         const FitOptions& options,
                         Progress& progress) {
-  return factors_of(fit_local_pca(source,
-                                  {.clusters = options.clusters,
-                                   .components = components,
-                                   .basis = options.basis,
-                                   .iterations = options.iterations,
-                                   .seed = options.seed},
-                                  progress,
-                                  *options.ranks));
+  return factors_of(fit_weighted_pca(source,
+                                     column_weights,
+                                     {.clusters = options.clusters,
+                                      .components = components,
+                                      .basis = options.basis,
+                                      .iterations = options.iterations,
+                                      .seed = options.seed},
+                                     progress,
+                                     *options.ranks));
 }
 
 void add_factors(const LpcaFactors& factors, int texels, Material::Contents& contents) {

@@ -41,8 +41,10 @@ struct LpcaFactors {
 
 /// Fits rows of one part for each of `components`, shared among options.ranks, and brings them to
 /// the stored form.
+/// @param column_weights  as fit_weighted_pca() takes them
 [[nodiscard]] LpcaFactors fit_factors(const RowSource& source,
                                       const std::vector<int>& components,
+                                      std::span<const float> column_weights,
                                       const FitOptions& options,
                                       Progress& progress);
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <utility>
 
 #include "btf/internal_sample_set.h"
 
@@ -23,6 +24,11 @@ Material::Contents::Tensor directions_tensor(const std::string& name,
   return {{name, DType::kF64, {static_cast<std::int64_t>(directions.size()), 3}},
           std::as_bytes(std::span(directions))};
 }
+
+constexpr const char* kBoxes = "boxes";
+// [views, lights][u_min, u_max, v_min, v_max]
+constexpr std::size_t kBoxValues = 8;
+static_assert(sizeof(DirectionBoxes) == kBoxValues * sizeof(double));
 
 }  // namespace
 
@@ -46,6 +52,24 @@ Result<MaterialFrame> read_frame(const SafetensorsFile& file) {
   VENEER_TRY(internal::check_info(
       info, Errc::kBadFormat, fmt::format("reading {}", file.path().string())));
   return frame_of(info);
+}
+
+void add_boxes(const DirectionBoxes& boxes, Material::Contents& contents) {
+  if (boxes.views.is_all() && boxes.lights.is_all()) return;
+  contents.tensors.push_back({{kBoxes, DType::kF64, {2, 4}}, std::as_bytes(std::span(&boxes, 1))});
+}
+
+Result<DirectionBoxes> read_boxes(const SafetensorsFile& file) {
+  DirectionBoxes boxes;
+  if (!file.contains(kBoxes)) return boxes;
+  VENEER_ASSIGN(const TensorView tensor, file.tensor(kBoxes, DType::kF64, {2, 4}));
+  const std::span<const double> values = tensor.as<double>();
+  boxes = {{values[0], values[1], values[2], values[3]},
+           {values[4], values[5], values[6], values[7]}};
+  for (const auto& [what, box] : {std::pair{"views", &boxes.views}, {"lights", &boxes.lights}})
+    if (const Status status = box->check(what); !status)
+      return fail(Errc::kBadFormat, "reading {}: {}", file.path().string(), status.error().what);
+  return boxes;
 }
 
 Status check_texture(std::string_view what,

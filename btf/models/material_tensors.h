@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "btf/fit_region.h"
 #include "btf/material.h"
 
 namespace veneer::btf {
@@ -26,6 +27,16 @@ void add_frame(const MaterialFrame& frame, Material::Contents& contents);
 /// Reads it back. Errors: kBadFormat (missing, sizes out of range, directions that no sample set
 /// may have).
 [[nodiscard]] Result<MaterialFrame> read_frame(const SafetensorsFile& file);
+
+/// Where a material's grids of views and of lights lie.
+struct DirectionBoxes {
+  DirectionBox views;
+  DirectionBox lights;
+};
+/// Adds the tensor "boxes" where one of them is not all; borrows them.
+void add_boxes(const DirectionBoxes& boxes, Material::Contents& contents);
+/// Reads them back: all where the file has none, as older ones. Errors: kBadFormat.
+[[nodiscard]] Result<DirectionBoxes> read_boxes(const SafetensorsFile& file);
 
 /// Texels of a texture's side that every GL 4.5 takes.
 inline constexpr int kMostTextureSide = 16384;

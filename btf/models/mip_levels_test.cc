@@ -137,7 +137,9 @@ class TwoFunctions final : public Material {
 TEST(MipLevels, GoWithSeparateClustersAndTheHalfAngle) {
   const TemporaryFolder folder;
   const auto path = folder.path() / "a.safetensors";
-  const MaterialFrame frame = frame_of(testing::small_info());
+  const auto fitted = FittedPairs::of(testing::small_info(), nullptr);
+  ASSERT_TRUE(fitted) << fitted.error().what;
+  const MaterialFrame& frame = fitted->frame();
   const TexelPyramid pyramid(frame.width, frame.height, kMostLevels);
   // Two kinds of each function, in all four pairings.
   const auto read = [&](int texel, std::span<float> first, std::span<float> second) {
@@ -154,7 +156,7 @@ TEST(MipLevels, GoWithSeparateClustersAndTheHalfAngle) {
   const auto fit_functions = [&](bool separate) {
     SilentProgress progress;
     return PackedLpca::fit(
-        frame,
+        *fitted,
         options_with("1+1"),
         {.components = {1, 1}, .angular = 12, .mip_levels = kMostLevels, .separate = separate},
         read,
@@ -166,7 +168,8 @@ TEST(MipLevels, GoWithSeparateClustersAndTheHalfAngle) {
   EXPECT_NEAR(separate->values_per_texel() - joint->values_per_texel(), 17.0 / 15, 1e-9);
   Pcg32 random(7);
   for (const bool half_angle : {false, true}) {
-    const PackedLpca functions = half_angle ? separate->with_half_angle(read, alone()) : *separate;
+    const PackedLpca functions =
+        half_angle ? separate->with_half_angle(read, *fitted, alone()) : *separate;
     ASSERT_TRUE(save_material(TwoFunctions(functions), path, {}));
     const auto file = SafetensorsFile::open(path);
     ASSERT_TRUE(file) << file.error().what;

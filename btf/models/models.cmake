@@ -13,6 +13,7 @@ set(VENEER_MODEL_SRCS
   models/eigen_rgb.cc
   models/eigen_texture/eigen_images.cc
   models/eigen_texture/eigen_texture.cc
+  models/fitted_pairs.cc
   models/half_angle.cc
   models/lafortune/lafortune.cc
   models/lobes/lafortune_lobes.cc
@@ -31,7 +32,8 @@ set(VENEER_MODEL_SRCS
   models/packed_texels.cc
   models/revised_lpca/revised_lpca.cc
   models/row_clusters.cc
-  models/texel_colours/texel_colours.cc)
+  models/texel_colours/texel_colours.cc
+  models/weighted_pca.cc)
 set(VENEER_MODEL_TESTS
   models/angular_grid_test.cc
   models/cluster_volume_test.cc
@@ -47,6 +49,7 @@ set(VENEER_MODEL_TESTS
   models/mip_levels_test.cc
   models/models_test.cc
   models/real_material_test.cc
+  models/region_test.cc
   models/revised_lpca/revised_lpca_test.cc)
 set(VENEER_MODEL_SHADERS
   models/cluster_volume.glsl

@@ -46,16 +46,23 @@ PackedTexels texels_of(const PackedLpca::Layout& layout) {
   return PackedTexels(cluster_lane_of(layout) + 1);
 }
 
+GridShape view_shape(const MaterialFrame& frame, const PackedLpca::Layout& layout) {
+  return GridShape::of(frame.views, DirectionRole::kView, layout.boxes.views, layout.angular);
+}
+GridShape light_shape(const MaterialFrame& frame, const PackedLpca::Layout& layout) {
+  return GridShape::of(frame.lights, layout.beyond, layout.boxes.lights, layout.angular);
+}
+
 // As the constructor will lay them out, without the padding of clusters to whole rows.
 double volume_bytes(const MaterialFrame& frame, const PackedLpca::Layout& layout, int clusters) {
-  const double nodes = layout.angular * layout.angular;
-  const double view_nodes = frame.views.size() == 1 ? 1.0 : nodes;
+  const double nodes =
+      double(view_shape(frame, layout).count()) * light_shape(frame, layout).count();
   const auto [first, second] = layout.components;
-  double values = view_nodes * nodes * volumes_for(layout.separate ? first : first + second);
+  double values = nodes * volumes_for(layout.separate ? first : first + second);
   if (layout.half_angle)
-    values = view_nodes * nodes * volumes_for(first) + half_angle::kNodes * volumes_for(second);
+    values = nodes * volumes_for(first) + half_angle::kNodes * volumes_for(second);
   else if (layout.separate)
-    values += view_nodes * nodes * volumes_for(second);
+    values += nodes * volumes_for(second);
   return values * clusters * static_cast<double>(bytes_per_texel(TexelFormat::kRgba16f));
 }
 
@@ -85,11 +92,12 @@ TexelPyramid PackedLpca::pyramid_of(const MaterialFrame& frame, const Layout& la
   return {frame.width, frame.height, layout.mip_levels};
 }
 
-Result<PackedLpca> PackedLpca::fit(const MaterialFrame& frame,
+Result<PackedLpca> PackedLpca::fit(const FittedPairs& pairs,
                                    const FitOptions& options,
                                    const Layout& layout,
                                    const Read& read,
                                    Progress& progress) {
+  const MaterialFrame& frame = pairs.frame();
   VENEER_TRY(check(frame, layout, options.clusters, Errc::kInvalidOption, "fit"));
   const auto count = static_cast<std::size_t>(frame.pair_count());
   const auto source_of = [&](int parts, std::function<void(int, std::span<float>)> rows) {
@@ -102,7 +110,8 @@ Result<PackedLpca> PackedLpca::fit(const MaterialFrame& frame,
     const RowSource both = source_of(2, [&](int texel, std::span<float> values) {
       read(texel, values.first(count), values.last(count));
     });
-    return PackedLpca(frame, layout, fit_factors(both, {first, second}, options, progress), {});
+    return PackedLpca(
+        frame, layout, fit_factors(both, {first, second}, pairs.weights(), options, progress), {});
   }
   const RowSource firsts = source_of(1, [&](int texel, std::span<float> values) {
     std::vector<float> other(count);
@@ -112,8 +121,8 @@ Result<PackedLpca> PackedLpca::fit(const MaterialFrame& frame,
     std::vector<float> other(count);
     read(texel, other, values);
   });
-  const LpcaFactors a = fit_factors(firsts, {first}, options, progress);
-  LpcaFactors b = fit_factors(seconds, {second}, options, progress);
+  const LpcaFactors a = fit_factors(firsts, {first}, pairs.weights(), options, progress);
+  LpcaFactors b = fit_factors(seconds, {second}, pairs.weights(), options, progress);
   return PackedLpca(frame, layout, side_by_side(a, b), std::move(b.cluster));
 }
 
@@ -125,9 +134,9 @@ PackedLpca::PackedLpca(MaterialFrame frame,
       layout_(layout),
       factors_(std::move(factors)),
       second_cluster_(std::move(second_cluster)),
-      views_(frame_.views, DirectionRole::kView, layout.angular),
-      lights_(frame_.lights, layout.beyond, layout.angular),
-      place_(factors_.clusters, views_.nodes(), lights_.nodes(), 1),
+      views_(frame_.views, DirectionRole::kView, view_shape(frame_, layout)),
+      lights_(frame_.lights, layout.beyond, light_shape(frame_, layout)),
+      place_(factors_.clusters, views_.shape(), lights_.shape(), 1),
       half_place_(factors_.clusters) {
   fill_volumes();
 }
@@ -167,7 +176,10 @@ RowMatrix PackedLpca::second_brdfs() const {
   return brdfs;
 }
 
-PackedLpca PackedLpca::with_half_angle(const Read& read, Communicator& ranks) const {
+PackedLpca PackedLpca::with_half_angle(const Read& read,
+                                       const FittedPairs& pairs,
+                                       Communicator& ranks) const {
+  const Eigen::VectorXf importance = pairs.all_weights().matrix();
   const int first = layout_.components[0];
   const int count = layout_.components[1];
   const RowMatrix brdfs = half_angle::values_at(
@@ -188,9 +200,10 @@ PackedLpca PackedLpca::with_half_angle(const Read& read, Communicator& ranks) co
           factors.eigen_brdfs.begin() + static_cast<std::ptrdiff_t>(at * columns),
           saturated_half);
     }
-    const Eigen::MatrixXd gram = (own * own.transpose()).cast<double>();
+    const RowMatrix weighted = own * importance.asDiagonal();
+    const Eigen::MatrixXd gram = (weighted * own.transpose()).cast<double>();
     weights_from_values.emplace_back(
-        (gram.completeOrthogonalDecomposition().pseudoInverse() * own.cast<double>())
+        (gram.completeOrthogonalDecomposition().pseudoInverse() * weighted.cast<double>())
             .cast<float>());
   }
   const RowRange own = rows_of_rank(pyramid().texel_count(), ranks);
@@ -217,9 +230,10 @@ PackedLpca PackedLpca::with_half_angle(const Read& read, Communicator& ranks) co
   return PackedLpca(frame_, layout, std::move(factors), second_cluster_);
 }
 
-Eigen::Vector2d PackedLpca::rmse(const Read& read) const {
+Eigen::Vector2d PackedLpca::rmse(const Read& read, const FittedPairs& pairs) const {
   constexpr int kTexels = 64;
   const int texels = std::min(frame_.texel_count(), kTexels);
+  const Eigen::ArrayXd importance = pairs.all_weights().cast<double>();
   std::vector<Eigen::Array2d> squares(static_cast<std::size_t>(texels), Eigen::Array2d::Zero());
   parallel_for(texels, 1, [&](std::int64_t begin, std::int64_t end) {
     std::vector<float> first(static_cast<std::size_t>(frame_.pair_count()));
@@ -227,20 +241,20 @@ Eigen::Vector2d PackedLpca::rmse(const Read& read) const {
     for (std::int64_t i = begin; i < end; ++i) {
       const auto texel = static_cast<int>(i * frame_.texel_count() / texels);
       read(texel, first, second);
-      std::size_t pair = 0;
+      Eigen::Index pair = 0;
       for (const Direction& view : frame_.views)
         for (const Direction& light : frame_.lights) {
-          const Eigen::Array2d wanted(static_cast<double>(first[pair]),
-                                      static_cast<double>(second[pair]));
+          const Eigen::Array2d wanted(static_cast<double>(first[static_cast<std::size_t>(pair)]),
+                                      static_cast<double>(second[static_cast<std::size_t>(pair)]));
           squares[static_cast<std::size_t>(i)] +=
-              (evaluate(texel, view, light).array() - wanted).square();
+              importance[pair] * (evaluate(texel, view, light).array() - wanted).square();
           ++pair;
         }
     }
   });
   Eigen::Array2d sum = Eigen::Array2d::Zero();
   for (const Eigen::Array2d& square : squares) sum += square;
-  return (sum / (texels * double(frame_.pair_count()))).sqrt();
+  return (sum / (texels * importance.sum())).sqrt();
 }
 
 void PackedLpca::fill_volumes() {
@@ -296,6 +310,7 @@ Result<PackedLpca> PackedLpca::load(const SafetensorsFile& file,
   layout.components = *components;
   VENEER_ASSIGN(layout.angular,
                 read_integer(file, "angular", FitOptions::kLeastAngular, FitOptions::kMostAngular));
+  VENEER_ASSIGN(layout.boxes, read_boxes(file));
   layout.mip_levels = 1;
   if (file.metadata().contains(kMipLevels)) {
     const int most = with_mip_levels ? TexelPyramid::most_levels(frame.width, frame.height) : 1;
@@ -323,6 +338,7 @@ void PackedLpca::add_to(Material::Contents& contents) const {
   contents.metadata["angular"] = fmt::format("{}", layout_.angular);
   // One level is what files without this entry have.
   if (layout_.mip_levels > 1) contents.metadata[kMipLevels] = fmt::format("{}", layout_.mip_levels);
+  add_boxes(layout_.boxes, contents);
   const int texels = pyramid().texel_count();
   add_factors(factors_, texels, contents);
   if (layout_.separate)
@@ -494,7 +510,7 @@ ModelShader PackedLpca::shader(std::span<const Eigen::half> colours) const {
   shader.textures.push_back(pack_texels(colours));
   for (int v = 0; v < volume_count(); ++v) shader.textures.push_back(volume_texture(v));
   const int single = layout_.half_angle ? volume_count() - first_volumes() : 0;
-  shader.fetches = texels.words() + 2 * volume_count() - single;
+  shader.fetches = texels.words() + place_.fetches() * (volume_count() - single) + single;
   shader.cache = EigenCache{
       .clusters = factors_.clusters, .layers = volume_count(), .texel_fetches = texels.words()};
   return shader;

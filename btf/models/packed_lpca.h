@@ -7,6 +7,7 @@
 
 #include "btf/models/angular_grid.h"
 #include "btf/models/cluster_volume.h"
+#include "btf/models/fitted_pairs.h"
 #include "btf/models/half_angle.h"
 #include "btf/models/lpca_factors.h"
 #include "btf/texel_pyramid.h"
@@ -28,13 +29,14 @@ class PackedLpca {
  public:
   /// Components of the first and the second function.
   using Components = std::array<int, 2>;
-  /// Reads the functions of one texel of the pyramid at every measured pair, [view][light];
+  /// Reads the functions of one texel of the pyramid at every pair of the frame, [view][light];
   /// thread-safe.
   using Read = std::function<void(int texel, std::span<float> first, std::span<float> second)>;
   /// What lights beyond the data do: kLight fades with the cosine, kView stays as at the border.
   struct Layout {
     Components components{};
     int angular = 16;
+    DirectionBoxes boxes = {};
     DirectionRole beyond = DirectionRole::kLight;
     int colours = 1;  ///< of a texel, 1 or 2
     int mip_levels = 1;
@@ -49,15 +51,17 @@ class PackedLpca {
                                     int clusters,
                                     Errc code,
                                     std::string_view doing);
-  /// Errors: kInvalidOption, of check().
-  [[nodiscard]] static Result<PackedLpca> fit(const MaterialFrame& frame,
+  /// Reads at the pairs of `pairs`, whose frame it has, with the boxes of `layout`. Errors:
+  /// kInvalidOption, of check().
+  [[nodiscard]] static Result<PackedLpca> fit(const FittedPairs& pairs,
                                               const FitOptions& options,
                                               const Layout& layout,
                                               const Read& read,
                                               Progress& progress);
   /// Reads what add_to() wrote, within the limits of fit(). Errors: kBadFormat, also where the file
   /// has mip levels and the model has not.
-  /// @param layout  components, angular and mip_levels are the file's, whatever it says of them.
+  /// @param layout  components, angular, boxes and mip_levels are the file's, whatever it says of
+  /// them.
   [[nodiscard]] static Result<PackedLpca> load(const SafetensorsFile& file,
                                                Layout layout,
                                                bool with_mip_levels = false);
@@ -72,11 +76,13 @@ class PackedLpca {
   [[nodiscard]] const Components& components() const { return layout_.components; }
   /// The same with the nearest second function of the half angle: its Eigen-BRDFs are taken there,
   /// and its weights found anew.
-  /// @param read, ranks  as fit() had them.
-  [[nodiscard]] PackedLpca with_half_angle(const Read& read, Communicator& ranks) const;
+  /// @param read, pairs, ranks  as fit() had them.
+  [[nodiscard]] PackedLpca with_half_angle(const Read& read,
+                                           const FittedPairs& pairs,
+                                           Communicator& ranks) const;
   /// How far each function of texels of the sample evenly chosen is from what `read` gives, as
-  /// drawn at the measured pairs: root mean square.
-  [[nodiscard]] Eigen::Vector2d rmse(const Read& read) const;
+  /// drawn at the measured pairs, these weighted: root mean square.
+  [[nodiscard]] Eigen::Vector2d rmse(const Read& read, const FittedPairs& pairs) const;
   /// As Material::values_per_texel(). A texel of the sample counts for its share of mip levels.
   [[nodiscard]] double values_per_texel() const;
   /// Both functions of a texel at every measured pair, from the factors.

@@ -8,6 +8,7 @@
 
 #include "base/parallel.h"
 #include "btf/models/components.h"
+#include "btf/models/fitted_pairs.h"
 #include "btf/models/packed_lpca.h"
 
 namespace veneer::btf {
@@ -116,12 +117,11 @@ Eigen::Vector3f best_colour(const Eigen::Matrix3d& gram) {
   return (colour.sum() < 0.0 ? -colour : colour).cast<float>();
 }
 
-// Of a texel whose samples have this sum of outer products: the colour that explains most of their
-// energy, zero where the samples are under the noise.
-Eigen::Vector3f learned_colour(const Eigen::Matrix3d& gram, Eigen::Index samples) {
+// Of a texel whose samples have this weighted sum of outer products and this sum of weights: the
+// colour that explains most of their energy, zero where the samples are under the noise.
+Eigen::Vector3f learned_colour(const Eigen::Matrix3d& gram, double samples) {
   const double noise = static_cast<double>(kNoise);
-  if (!(gram.trace() >= noise * noise * static_cast<double>(samples)))
-    return Eigen::Vector3f::Zero();
+  if (!(gram.trace() >= noise * noise * samples)) return Eigen::Vector3f::Zero();
   return best_colour(gram);
 }
 
@@ -243,38 +243,43 @@ DirectionRole beyond(bool subtractive) {
 // Looks at all samples once, each rank at its own: the reference, the colours and how many texels
 // are masked.
 Terms find_terms(const SampleSet& set,
+                 const FittedPairs& fitted,
                  std::string form,
                  std::vector<Eigen::half>& reference,
                  Communicator& ranks,
                  Progress& progress) {
   Terms terms = Terms::of(std::move(form));
   const bool learned = terms.form == kLearned;
-  const SampleSetInfo& info = set.info();
+  const MaterialFrame& info = fitted.frame();
   const int reference_pair = nearest_normal(info.views) * static_cast<int>(info.lights.size()) +
                              nearest_normal(info.lights);
   const auto pairs = static_cast<Eigen::Index>(info.pair_count());
+  const Eigen::VectorXd weights = fitted.all_weights().cast<double>().matrix();
   const RowRange own = rows_of_rank(info.texel_count(), ranks);
   reference.resize(static_cast<std::size_t>(own.count) * 3);
   // One texel's share at a place of its own, so that the sum has one order whatever the threads do.
   std::vector<Eigen::Matrix3d> specular(static_cast<std::size_t>(own.count));
   std::vector<Eigen::Matrix3d> shade(specular.size());
+  const auto gram = [&weights](const Eigen::MatrixX3d& values) -> Eigen::Matrix3d {
+    return values.transpose() * weights.asDiagonal() * values;
+  };
   progress.start("colours", own.count);
   parallel_for(own.count, 16, [&](std::int64_t begin, std::int64_t end) {
     std::vector<float> rgb(static_cast<std::size_t>(pairs) * 3);
     const Samples samples(rgb.data(), pairs, 3);
     for (auto i = static_cast<int>(begin); i < end; ++i) {
       const auto index = static_cast<std::size_t>(i);
-      set.rgb(own.first + i, Part::kDiffuse, rgb);
+      fitted.rgb(set, own.first + i, Part::kDiffuse, rgb);
       const Eigen::RowVector3f here = samples.row(reference_pair);
       const Eigen::MatrixX3d diffuse = samples.cast<double>();
       Eigen::Map<Half3>(reference.data() + 3 * i) =
-          (learned ? learned_colour(diffuse.transpose() * diffuse, pairs) : here.transpose())
+          (learned ? learned_colour(gram(diffuse), weights.sum()) : here.transpose())
               .cast<Eigen::half>();
       const Eigen::MatrixX3d taken = (samples.rowwise() - here).cast<double>();
-      shade[index] = taken.transpose() * taken;
-      set.rgb(own.first + i, Part::kSpecular, rgb);
+      shade[index] = gram(taken);
+      fitted.rgb(set, own.first + i, Part::kSpecular, rgb);
       const Eigen::MatrixX3d shine = samples.cast<double>();
-      specular[index] = shine.transpose() * shine;
+      specular[index] = gram(shine);
     }
     progress.advance(end - begin);
   });
@@ -300,10 +305,11 @@ Terms find_terms(const SampleSet& set,
 bool serves(const PackedLpca& half_angle,
             const PackedLpca& product,
             const PackedLpca::Read& read,
+            const FittedPairs& pairs,
             Progress& progress) {
   progress.start("specular term", 1);
-  const double with = half_angle.rmse(read)[1];
-  const double without = product.rmse(read)[1];
+  const double with = half_angle.rmse(read, pairs)[1];
+  const double without = product.rmse(read, pairs)[1];
   progress.finish(fmt::format("rmse {:.3g} over the half angle, {:.3g} without", with, without));
   return with <= kHalfAngleServes * without;
 }
@@ -328,44 +334,47 @@ Result<std::unique_ptr<Material>> fit_dichromatic_lpca(const SampleSet& set,
         "capture the sample with polarisers",
         set.path().string(),
         kName);
-  const MaterialFrame frame = frame_of(set.info());
+  VENEER_ASSIGN(const FittedPairs pairs, FittedPairs::of(set.info(), options.region));
+  const MaterialFrame& frame = pairs.frame();
   const PackedLpca::Layout layout{.components = components,
                                   .angular = options.angular,
+                                  .boxes = pairs.boxes(),
                                   .beyond = beyond(form == kSubtractive),
                                   .colours = kColours};
   VENEER_TRY(PackedLpca::check(frame, layout, options.clusters, Errc::kInvalidOption, "fit"));
   VENEER_TRY(check_samples(set, options));
 
   std::vector<Eigen::half> reference;
-  Terms terms = find_terms(set, form, reference, *options.ranks, progress);
+  Terms terms = find_terms(set, pairs, form, reference, *options.ranks, progress);
   const auto read = [&](int texel, std::span<float> shading, std::span<float> specular) {
     std::vector<float> rgb(3 * shading.size());
     const Samples samples(rgb.data(), frame.pair_count(), 3);
     Eigen::Map<Eigen::VectorXf> first(shading.data(), samples.rows());
     const Eigen::Vector3f here = colour_at(reference, texel);
-    set.rgb(texel, Part::kDiffuse, rgb);
+    pairs.rgb(set, texel, Part::kDiffuse, rgb);
     if (terms.subtractive)
       first = (here.dot(terms.shade_colour) - (samples * terms.shade_colour).array()).matrix();
     else
       first = samples * Dichromatic::body_colour(here);
-    set.rgb(texel, Part::kSpecular, rgb);
+    pairs.rgb(set, texel, Part::kSpecular, rgb);
     Eigen::Map<Eigen::VectorXf>(specular.data(), samples.rows()) = samples * terms.specular_colour;
   };
   const auto fit_scalars = [&](bool separate) {
     PackedLpca::Layout own = layout;
     own.separate = separate;
-    return PackedLpca::fit(frame, options, own, read, progress);
+    return PackedLpca::fit(pairs, options, own, read, progress);
   };
   VENEER_ASSIGN(PackedLpca scalars, fit_scalars(options.clustering == kSeparate));
   if (options.clustering == kMeasured) {
     VENEER_ASSIGN(PackedLpca separate, fit_scalars(true));
-    if (separate.rmse(read).norm() < kSeparateServes * scalars.rmse(read).norm())
+    if (separate.rmse(read, pairs).norm() < kSeparateServes * scalars.rmse(read, pairs).norm())
       scalars = std::move(separate);
   }
   const bool measured = options.specular == kMeasured && !terms.subtractive;
   if (measured || options.specular == kHalfAngle) {
-    PackedLpca half_angle = scalars.with_half_angle(read, *options.ranks);
-    if (!measured || serves(half_angle, scalars, read, progress)) scalars = std::move(half_angle);
+    PackedLpca half_angle = scalars.with_half_angle(read, pairs, *options.ranks);
+    if (!measured || serves(half_angle, scalars, read, pairs, progress))
+      scalars = std::move(half_angle);
   }
   return std::make_unique<Dichromatic>(std::move(scalars), std::move(terms), std::move(reference));
 }

@@ -18,6 +18,9 @@ constexpr int kCodes = 255;  // steps from the first code to the last
 // Texels read at once: 20 MB of the Bonn sets.
 constexpr int kBlock = 256;
 
+// Eigenvalues under this part of the largest are rounding.
+constexpr double kRankTolerance = 1e-12;
+
 using Gram = Eigen::MatrixXd;
 using Samples = Eigen::Map<const RowMatrix>;  // of a texel and view: [light][channel]
 
@@ -29,8 +32,10 @@ struct Range {
 
 // A view's lights x lights products over all texels and channels. Every view adds up texels in
 // their order, so that threads change nothing.
-std::vector<Gram> gram_matrices(const SampleSet& set, Progress& progress) {
-  const SampleSetInfo& info = set.info();
+std::vector<Gram> gram_matrices(const SampleSet& set,
+                                const FittedPairs& pairs,
+                                Progress& progress) {
+  const MaterialFrame& info = pairs.frame();
   const auto lights = static_cast<Eigen::Index>(info.lights.size());
   const auto views = static_cast<std::int64_t>(info.views.size());
   const auto values = static_cast<std::size_t>(info.pair_count()) * 3;
@@ -41,9 +46,10 @@ std::vector<Gram> gram_matrices(const SampleSet& set, Progress& progress) {
     const int count = std::min(kBlock, info.texel_count() - first);
     parallel_for(count, 8, [&](std::int64_t begin, std::int64_t end) {
       for (auto i = static_cast<int>(begin); i < end; ++i)
-        set.rgb(first + i,
-                Part::kTotal,
-                std::span(block).subspan(static_cast<std::size_t>(i) * values, values));
+        pairs.rgb(set,
+                  first + i,
+                  Part::kTotal,
+                  std::span(block).subspan(static_cast<std::size_t>(i) * values, values));
     });
     parallel_for(views, 1, [&](std::int64_t begin, std::int64_t end) {
       Eigen::MatrixXd columns(lights, 3 * count);
@@ -61,35 +67,60 @@ std::vector<Gram> gram_matrices(const SampleSet& set, Progress& progress) {
   return grams;
 }
 
+// How a view's pictures make its images, and these the pictures again: [component][light].
+struct Basis {
+  RowMatrix project;
+  RowMatrix rebuild;
+};
+
 // The strongest eigenvectors as rows, zero beyond the matrix's size.
-RowMatrix eigenvectors(const Gram& gram, int components) {
+Basis eigenvectors(const Gram& gram, int components) {
   const Eigen::SelfAdjointEigenSolver<Gram> solver(gram);  // reads the lower half
   RowMatrix rows = RowMatrix::Zero(components, gram.rows());
   for (Eigen::Index i = 0; i < std::min<Eigen::Index>(components, gram.rows()); ++i)
     rows.row(i) = solver.eigenvectors().col(gram.cols() - 1 - i).transpose().cast<float>();
-  return rows;
+  return {rows, rows};
+}
+
+// The same with lights scaled by `roots`, the square roots of their weights. With G the Gram matrix
+// and v an eigenvector of D G D to the value c, images are made by D v, and G D v / c is what they
+// explain of every light: v / root where that is not 0.
+Basis weighted_eigenvectors(const Gram& gram, const Eigen::VectorXd& roots, int components) {
+  const Gram whole = gram.selfadjointView<Eigen::Lower>();
+  const Eigen::SelfAdjointEigenSolver<Gram> solver(roots.asDiagonal() * whole * roots.asDiagonal());
+  Basis basis{RowMatrix::Zero(components, gram.rows()), RowMatrix::Zero(components, gram.rows())};
+  const Eigen::VectorXd& values = solver.eigenvalues();
+  const Eigen::Index last = gram.cols() - 1;
+  for (Eigen::Index i = 0; i < std::min<Eigen::Index>(components, gram.rows()); ++i) {
+    if (!(values[last - i] > kRankTolerance * values[last])) break;
+    const Eigen::VectorXd project = roots.cwiseProduct(solver.eigenvectors().col(last - i));
+    basis.project.row(i) = project.transpose().cast<float>();
+    basis.rebuild.row(i) = (whole * project / values[last - i]).transpose().cast<float>();
+  }
+  return basis;
 }
 
 // Calls use(texel, images) for all, with images [view, component][channel]; from several threads.
 template <class Use>
 void project(const SampleSet& set,
-             const std::vector<RowMatrix>& bases,
+             const FittedPairs& pairs,
+             const std::vector<Basis>& bases,
              std::string_view label,
              Progress& progress,
              const Use& use) {
-  const SampleSetInfo& info = set.info();
+  const MaterialFrame& info = pairs.frame();
   const auto lights = static_cast<Eigen::Index>(info.lights.size());
   const auto views = static_cast<Eigen::Index>(bases.size());
-  const auto components = bases.front().rows();
+  const auto components = bases.front().project.rows();
   progress.start(label, info.texel_count());
   parallel_for(info.texel_count(), 16, [&](std::int64_t begin, std::int64_t end) {
     std::vector<float> rgb(static_cast<std::size_t>(info.pair_count()) * 3);
     RowMatrix images(views * components, 3);
     for (auto texel = static_cast<int>(begin); texel < end; ++texel) {
-      set.rgb(texel, Part::kTotal, rgb);
+      pairs.rgb(set, texel, Part::kTotal, rgb);
       for (Eigen::Index view = 0; view < views; ++view)
         images.middleRows(view * components, components).noalias() =
-            bases[static_cast<std::size_t>(view)] *
+            bases[static_cast<std::size_t>(view)].project *
             Samples(rgb.data() + view * lights * 3, lights, 3);
       use(texel, images);
     }
@@ -100,11 +131,12 @@ void project(const SampleSet& set,
 
 // [view, component]
 std::vector<Range> ranges_of(const SampleSet& set,
-                             const std::vector<RowMatrix>& bases,
+                             const FittedPairs& pairs,
+                             const std::vector<Basis>& bases,
                              Progress& progress) {
-  std::vector<Range> ranges(bases.size() * static_cast<std::size_t>(bases.front().rows()));
+  std::vector<Range> ranges(bases.size() * static_cast<std::size_t>(bases.front().project.rows()));
   std::mutex mutex;
-  project(set, bases, "ranges", progress, [&](int, const RowMatrix& images) {
+  project(set, pairs, bases, "ranges", progress, [&](int, const RowMatrix& images) {
     const std::lock_guard lock(mutex);
     for (std::size_t i = 0; i < ranges.size(); ++i) {
       const auto image = images.row(static_cast<Eigen::Index>(i));
@@ -153,25 +185,40 @@ Eigen::Vector3d EigenImages::image(std::size_t view_and_texel, int component) co
 }
 
 EigenImages fit_eigen_images(const SampleSet& set,
+                             const FittedPairs& pairs,
                              int components,
                              Precision precision,
                              Progress& progress) {
-  const std::vector<Gram> grams = gram_matrices(set, progress);
-  std::vector<RowMatrix> bases(grams.size());
+  const std::vector<Gram> grams = gram_matrices(set, pairs, progress);
+  const std::span<const float> weights = pairs.weights();
+  std::vector<Basis> bases(grams.size());
   parallel_for(
       static_cast<std::int64_t>(grams.size()), 1, [&](std::int64_t begin, std::int64_t end) {
         for (auto view = static_cast<std::size_t>(begin); view < static_cast<std::size_t>(end);
-             ++view)
-          bases[view] = eigenvectors(grams[view], components);
+             ++view) {
+          const auto lights = static_cast<std::size_t>(grams[view].rows());
+          const bool alike =
+              weights.empty() || std::ranges::all_of(weights.subspan(view * lights, lights),
+                                                     [](float w) { return w == 0.0F; });
+          bases[view] = alike
+                            ? eigenvectors(grams[view], components)
+                            : weighted_eigenvectors(grams[view],
+                                                    Eigen::Map<const Eigen::ArrayXf>(
+                                                        &weights[view * lights], grams[view].rows())
+                                                        .cast<double>()
+                                                        .sqrt(),
+                                                    components);
+        }
       });
 
-  std::vector<Range> ranges = ranges_of(set, bases, progress);
+  std::vector<Range> ranges = ranges_of(set, pairs, bases, progress);
   const auto count = static_cast<std::size_t>(components);
   // An eigenvector's sign is free: the larger end of the range is made the upper one.
   for (std::size_t i = 0; i < ranges.size(); ++i)
     if (-ranges[i].least > ranges[i].most) {
       ranges[i] = {-ranges[i].most, -ranges[i].least};
-      bases[i / count].row(static_cast<Eigen::Index>(i % count)) *= -1.0F;
+      for (RowMatrix* rows : {&bases[i / count].project, &bases[i / count].rebuild})
+        rows->row(static_cast<Eigen::Index>(i % count)) *= -1.0F;
     }
 
   const bool bytes = precision == Precision::k8Bit;
@@ -186,12 +233,12 @@ EigenImages fit_eigen_images(const SampleSet& set,
     scales[i] =
         bytes ? float(kCodes) * step_of(ranges[i], images.zeros[i % count]) : ranges[i].most;
   for (std::size_t view = 0; view < bases.size(); ++view)
-    for (Eigen::Index light = 0; light < bases[view].cols(); ++light)
+    for (Eigen::Index light = 0; light < bases[view].rebuild.cols(); ++light)
       for (std::size_t i = 0; i < count; ++i)
-        images.weights.push_back(saturated_half(scales[view * count + i] *
-                                                bases[view](static_cast<Eigen::Index>(i), light)));
+        images.weights.push_back(saturated_half(
+            scales[view * count + i] * bases[view].rebuild(static_cast<Eigen::Index>(i), light)));
 
-  const auto texels = static_cast<std::size_t>(set.info().texel_count());
+  const auto texels = static_cast<std::size_t>(pairs.frame().texel_count());
   const std::size_t all = bases.size() * texels * static_cast<std::size_t>(images.values());
   if (bytes) {
     images.codes.resize(all);
@@ -199,23 +246,24 @@ EigenImages fit_eigen_images(const SampleSet& set,
     images.halves.resize(all);
   }
   const auto values = static_cast<std::size_t>(images.values());
-  project(set, bases, "Eigen-textures", progress, [&](int texel, const RowMatrix& projected) {
-    for (std::size_t i = 0; i < scales.size(); ++i) {
-      const std::size_t out =
-          (i / count * texels + static_cast<std::size_t>(texel)) * values + i % count * 3;
-      const float shrink = scales[i] > 0.0F ? 1.0F / scales[i] : 0.0F;
-      for (std::size_t c = 0; c < 3; ++c) {
-        const float value =
-            shrink * projected(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(c));
-        if (bytes) {
-          const auto code = images.zeros[i % count] + std::lround(float(kCodes) * value);
-          images.codes[out + c] = static_cast<std::uint8_t>(std::clamp<long>(code, 0, kCodes));
-        } else {
-          images.halves[out + c] = Eigen::half(value);
+  project(
+      set, pairs, bases, "Eigen-textures", progress, [&](int texel, const RowMatrix& projected) {
+        for (std::size_t i = 0; i < scales.size(); ++i) {
+          const std::size_t out =
+              (i / count * texels + static_cast<std::size_t>(texel)) * values + i % count * 3;
+          const float shrink = scales[i] > 0.0F ? 1.0F / scales[i] : 0.0F;
+          for (std::size_t c = 0; c < 3; ++c) {
+            const float value =
+                shrink * projected(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(c));
+            if (bytes) {
+              const auto code = images.zeros[i % count] + std::lround(float(kCodes) * value);
+              images.codes[out + c] = static_cast<std::uint8_t>(std::clamp<long>(code, 0, kCodes));
+            } else {
+              images.halves[out + c] = Eigen::half(value);
+            }
+          }
         }
-      }
-    }
-  });
+      });
   return images;
 }
 

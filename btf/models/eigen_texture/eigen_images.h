@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "btf/models/components.h"
+#include "btf/models/fitted_pairs.h"
 #include "btf/models/material_tensors.h"
 
 namespace veneer::btf {
@@ -28,8 +29,12 @@ struct EigenImages {
   [[nodiscard]] Eigen::Vector3d image(std::size_t view_and_texel, int component) const;
 };
 
+/// Errors of a view's lights count by their weights; lights without one get what the images explain
+/// of them in the least squares, and a view without any counts all alike.
+/// @param pairs  whose frame the images and weights are of
 /// @param components  1 or more; those beyond the number of lights are 0.
 [[nodiscard]] EigenImages fit_eigen_images(const SampleSet& set,
+                                           const FittedPairs& pairs,
                                            int components,
                                            Precision precision,
                                            Progress& progress);

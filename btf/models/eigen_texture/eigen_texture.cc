@@ -285,11 +285,12 @@ Result<std::unique_ptr<Material>> fit_eigen_texture(const SampleSet& set,
   VENEER_ASSIGN(const int components, parse_one_term(options.components, kName));
   VENEER_ASSIGN(const Precision precision,
                 parse_precision(options.precision, Precision::k8Bit, kName));
-  MaterialFrame frame = frame_of(set.info());
+  VENEER_ASSIGN(const FittedPairs pairs, FittedPairs::of(set.info(), options.region));
+  const MaterialFrame& frame = pairs.frame();
   VENEER_TRY(check_textures(frame, components, precision, Errc::kInvalidOption, "fit"));
   VENEER_TRY(set.check_finite());
-  EigenImages images = fit_eigen_images(set, components, precision, progress);
-  return std::make_unique<EigenTexture>(std::move(frame), std::move(images));
+  EigenImages images = fit_eigen_images(set, pairs, components, precision, progress);
+  return std::make_unique<EigenTexture>(frame, std::move(images));
 }
 
 Result<std::unique_ptr<Material>> load_eigen_texture(const SafetensorsFile& file) {

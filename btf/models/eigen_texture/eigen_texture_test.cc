@@ -174,8 +174,11 @@ TEST(EigenTexture, EightBitsDifferFromSixteenByNoMoreThanTheirRounding) {
   const SampleSet set = formula_set(folder.path() / "a.btfset", small_info());
   SilentProgress progress;
   constexpr int kComponents = 4;
-  const EigenImages coarse = fit_eigen_images(set, kComponents, Precision::k8Bit, progress);
-  const EigenImages fine = fit_eigen_images(set, kComponents, Precision::kFloat16, progress);
+  const auto pairs = FittedPairs::of(set.info(), nullptr);
+  ASSERT_TRUE(pairs) << pairs.error().what;
+  const EigenImages coarse = fit_eigen_images(set, *pairs, kComponents, Precision::k8Bit, progress);
+  const EigenImages fine =
+      fit_eigen_images(set, *pairs, kComponents, Precision::kFloat16, progress);
   const std::size_t lights = set.info().lights.size();
   const auto texels = static_cast<std::size_t>(set.info().texel_count());
   double largest = 0.0;

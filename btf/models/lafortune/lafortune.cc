@@ -99,11 +99,12 @@ Result<std::unique_ptr<Material>> fit_lafortune(const SampleSet& set,
   VENEER_TRY(refuse_mip_levels(options, kName));
   VENEER_TRY(refuse_form(options, kName));
   VENEER_TRY(refuse_precision(options, kName));
-  MaterialFrame frame = frame_of(set.info());
+  VENEER_ASSIGN(const FittedPairs pairs, FittedPairs::of(set.info(), options.region));
+  const MaterialFrame& frame = pairs.frame();
   VENEER_TRY(check_array("the lobes", frame, 2 + options.lobes, Errc::kInvalidOption, "fit"));
   VENEER_TRY(set.check_finite());
-  return std::make_unique<Lafortune>(std::move(frame),
-                                     LafortuneLobes::fit(set, options.lobes, progress));
+  return std::make_unique<Lafortune>(frame,
+                                     LafortuneLobes::fit(set, pairs, options.lobes, progress));
 }
 
 Result<std::unique_ptr<Material>> load_lafortune(const SafetensorsFile& file) {

@@ -121,12 +121,15 @@ LobeSamples light_samples(const MaterialFrame& frame) {
   return samples;
 }
 
-LobeTargets weighted_targets(std::span<const float> rgb) {
+LobeTargets weighted_targets(std::span<const float> rgb, std::span<const float> importance) {
   const Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>> values(
       rgb.data(), static_cast<Eigen::Index>(rgb.size() / kChannels), 3);
   LobeTargets targets;
   targets.weight =
       (-kWeightPower * (values.rowwise().mean().array().max(0.0F) + kWeightFloor).log()).exp();
+  if (!importance.empty())
+    targets.weight *=
+        Eigen::Map<const Eigen::ArrayXf>(importance.data(), targets.weight.size()).sqrt();
   targets.rgb = values.array().colwise() * targets.weight;
   return targets;
 }
@@ -156,17 +159,21 @@ void LafortuneLobes::set_texel(int texel, const StoredLobes& stored) {
   std::ranges::copy(stored.lobes, shapes.begin() + kLobeValues * lobes * at);
 }
 
-LafortuneLobes LafortuneLobes::fit(const SampleSet& set, int lobes, Progress& progress) {
-  const MaterialFrame frame = frame_of(set.info());
+LafortuneLobes LafortuneLobes::fit(const SampleSet& set,
+                                   const FittedPairs& pairs,
+                                   int lobes,
+                                   Progress& progress) {
+  const MaterialFrame& frame = pairs.frame();
   const LobeFitter fitter(pair_samples(frame), lobes);
   LafortuneLobes result(frame.texel_count(), lobes);
   std::atomic<int> fallbacks = 0;
+  const std::vector<float> importance = pairs.weights_everywhere();
   progress.start("lobes", frame.texel_count());
   parallel_for(frame.texel_count(), kGrain, [&](std::int64_t begin, std::int64_t end) {
     std::vector<float> rgb(kChannels * static_cast<std::size_t>(frame.pair_count()));
     for (auto texel = static_cast<int>(begin); texel < end; ++texel) {
-      set.rgb(texel, Part::kTotal, rgb);
-      const TexelFit fit = fit_texel(fitter, weighted_targets(rgb));
+      pairs.rgb(set, texel, Part::kTotal, rgb);
+      const TexelFit fit = fit_texel(fitter, weighted_targets(rgb, importance));
       result.set_texel(texel, fit.stored);
       fallbacks += fit.fell_back ? 1 : 0;
     }

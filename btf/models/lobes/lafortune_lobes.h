@@ -7,6 +7,7 @@
 
 #include "base/progress.h"
 #include "btf/material.h"
+#include "btf/models/fitted_pairs.h"
 #include "btf/models/lobes/lobe_fit.h"
 #include "btf/models/material_tensors.h"
 
@@ -54,9 +55,10 @@ class LayerWriter {
 
 /// RGB of samples as targets of a fit, each weighted by (its mean + kWeightFloor)^-kWeightPower:
 /// near to what a difference is worth after encoding, which is what the tables of the literature
-/// count.
-/// @param rgb  [sample][3]
-[[nodiscard]] LobeTargets weighted_targets(std::span<const float> rgb);
+/// count. @param rgb  [sample][3] @param importance  what squared errors of each sample are
+/// weighted by beside that; empty: all alike.
+[[nodiscard]] LobeTargets weighted_targets(std::span<const float> rgb,
+                                           std::span<const float> importance = {});
 
 /// What a fit says at its end where texels fell back.
 [[nodiscard]] std::string fallback_remark(int texels);
@@ -79,7 +81,10 @@ struct LafortuneLobes {
 
   /// All black.
   LafortuneLobes(int texels, int lobes);
-  [[nodiscard]] static LafortuneLobes fit(const SampleSet& set, int lobes, Progress& progress);
+  [[nodiscard]] static LafortuneLobes fit(const SampleSet& set,
+                                          const FittedPairs& pairs,
+                                          int lobes,
+                                          Progress& progress);
   void set_texel(int texel, const StoredLobes& stored);
   /// Errors: kBadFormat.
   [[nodiscard]] static Result<LafortuneLobes> read(const SafetensorsFile& file,

@@ -6,6 +6,7 @@
 #include "btf/models/components.h"
 #include "btf/models/direction_lookup.h"
 #include "btf/models/eigen_rgb.h"
+#include "btf/models/fitted_pairs.h"
 #include "btf/models/lpca_factors.h"
 
 namespace veneer::btf {
@@ -209,15 +210,17 @@ Result<std::unique_ptr<Material>> fit_lpca(const SampleSet& set,
   VENEER_TRY(refuse_form(options, kName));
   VENEER_TRY(refuse_precision(options, kName));
   VENEER_ASSIGN(const int components, parse_one_term(options.components, kName));
-  MaterialFrame frame = frame_of(set.info());
+  VENEER_ASSIGN(const FittedPairs pairs, FittedPairs::of(set.info(), options.region));
+  const MaterialFrame& frame = pairs.frame();
   VENEER_TRY(check_textures(frame, components, Errc::kInvalidOption, "fit"));
   VENEER_TRY(check_samples(set, options));
   RowSource source;
   source.rows = frame.texel_count();
   source.part_columns = {frame.pair_count() * 3};
-  source.read = [&set](int texel, std::span<float> rgb) { set.rgb(texel, Part::kTotal, rgb); };
-  LpcaFactors factors = fit_factors(source, {components}, options, progress);
-  return std::make_unique<Lpca>(std::move(frame), std::move(factors));
+  source.read = [&](int texel, std::span<float> rgb) { pairs.rgb(set, texel, Part::kTotal, rgb); };
+  LpcaFactors factors =
+      fit_factors(source, {components}, pairs.column_weights(3), options, progress);
+  return std::make_unique<Lpca>(frame, std::move(factors));
 }
 
 Result<std::unique_ptr<Material>> load_lpca(const SafetensorsFile& file) {

@@ -241,25 +241,27 @@ Result<std::unique_ptr<Material>> fit_phong(const SampleSet& set,
   VENEER_TRY(refuse_mip_levels(options, kName));
   VENEER_TRY(refuse_form(options, kName));
   VENEER_TRY(refuse_precision(options, kName));
-  MaterialFrame frame = frame_of(set.info());
+  VENEER_ASSIGN(const FittedPairs pairs, FittedPairs::of(set.info(), options.region));
+  const MaterialFrame& frame = pairs.frame();
   VENEER_TRY(check_array("the texels", frame, kLayers, Errc::kInvalidOption, "fit"));
   VENEER_TRY(set.check_finite());
   const PhongFitter fitter(frame);
   std::vector<Eigen::half> values(kValues * static_cast<std::size_t>(frame.texel_count()));
   std::atomic<int> fallbacks = 0;
+  const std::vector<float> importance = pairs.weights_everywhere();
   progress.start("highlights", frame.texel_count());
   parallel_for(frame.texel_count(), 16, [&](std::int64_t begin, std::int64_t end) {
     std::vector<float> rgb(3 * static_cast<std::size_t>(frame.pair_count()));
     for (auto texel = static_cast<int>(begin); texel < end; ++texel) {
-      set.rgb(texel, Part::kTotal, rgb);
-      const PhongFit fit = fitter.fit(weighted_targets(rgb));
+      pairs.rgb(set, texel, Part::kTotal, rgb);
+      const PhongFit fit = fitter.fit(weighted_targets(rgb, importance));
       std::ranges::copy(fit.values, &values[kValues * static_cast<std::size_t>(texel)]);
       fallbacks += fit.fell_back ? 1 : 0;
     }
     progress.advance(end - begin);
   });
   progress.finish(fallback_remark(fallbacks));
-  return std::make_unique<Phong>(std::move(frame), std::move(values), fallbacks);
+  return std::make_unique<Phong>(frame, std::move(values), fallbacks);
 }
 
 Result<std::unique_ptr<Material>> load_phong(const SafetensorsFile& file) {

@@ -278,7 +278,8 @@ Result<std::unique_ptr<Material>> fit_reflectance_field(const SampleSet& set,
   VENEER_TRY(refuse_mip_levels(options, kName));
   VENEER_TRY(refuse_form(options, kName));
   VENEER_TRY(refuse_precision(options, kName));
-  MaterialFrame frame = frame_of(set.info());
+  VENEER_ASSIGN(const FittedPairs pairs, FittedPairs::of(set.info(), options.region));
+  const MaterialFrame& frame = pairs.frame();
   VENEER_TRY(check_array(
       "the fields", frame, layers_of(frame, options.lobes), Errc::kInvalidOption, "fit"));
   VENEER_TRY(set.check_finite());
@@ -292,13 +293,14 @@ Result<std::unique_ptr<Material>> fit_reflectance_field(const SampleSet& set,
   fields.specular.resize(3 * texels * views);
   fields.shapes.resize(values * texels * views);
   std::atomic<int> fallbacks = 0;
+  const std::vector<float> importance = pairs.weights_everywhere();
   progress.start("reflectance fields", frame.texel_count());
   parallel_for(frame.texel_count(), 4, [&](std::int64_t begin, std::int64_t end) {
     std::vector<float> rgb(3 * static_cast<std::size_t>(frame.pair_count()));
     for (auto texel = static_cast<std::size_t>(begin); texel < static_cast<std::size_t>(end);
          ++texel) {
-      set.rgb(static_cast<int>(texel), Part::kTotal, rgb);
-      const TexelFields fit = fitter.fit(weighted_targets(rgb));
+      pairs.rgb(set, static_cast<int>(texel), Part::kTotal, rgb);
+      const TexelFields fit = fitter.fit(weighted_targets(rgb, importance));
       std::ranges::copy(fit.diffuse, &fields.diffuse[3 * texel]);
       for (std::size_t view = 0; view < views; ++view) {
         const std::size_t at = texel * views + view;
@@ -311,7 +313,7 @@ Result<std::unique_ptr<Material>> fit_reflectance_field(const SampleSet& set,
   });
   fields.fallback_texels = fallbacks;
   progress.finish(fallback_remark(fallbacks));
-  return std::make_unique<ReflectanceField>(std::move(frame), std::move(fields));
+  return std::make_unique<ReflectanceField>(frame, std::move(fields));
 }
 
 Result<std::unique_ptr<Material>> load_reflectance_field(const SafetensorsFile& file) {

@@ -10,6 +10,7 @@
 #include "btf/models/cluster_volume.h"
 #include "btf/models/components.h"
 #include "btf/models/eigen_rgb.h"
+#include "btf/models/fitted_pairs.h"
 #include "btf/models/lpca_factors.h"
 #include "btf/models/packed_texels.h"
 
@@ -33,6 +34,7 @@ constexpr char kClusterVolumeGlsl[] =
 struct Layout {
   int components = 0;
   int angular = 0;
+  DirectionBoxes boxes = {};
   Precision precision = Precision::k8Bit;
 
   [[nodiscard]] TexelFormat format() const {
@@ -41,14 +43,20 @@ struct Layout {
   // A texel's weights, then its cluster.
   [[nodiscard]] PackedTexels texels() const { return PackedTexels(components + 1); }
 
+  [[nodiscard]] GridShape view_shape(const MaterialFrame& frame) const {
+    return GridShape::of(frame.views, DirectionRole::kView, boxes.views, angular);
+  }
+  [[nodiscard]] GridShape light_shape(const MaterialFrame& frame) const {
+    return GridShape::of(frame.lights, DirectionRole::kLight, boxes.lights, angular);
+  }
+
   [[nodiscard]] Status check(const MaterialFrame& frame,
                              int clusters,
                              Errc code,
                              std::string_view doing) const {
     VENEER_TRY(texels().check(frame, code, doing));
-    const double nodes = angular * angular;
-    return ClusterVolume::check((frame.views.size() == 1 ? 1.0 : nodes) * nodes * components *
-                                    std::min(clusters, frame.texel_count()) *
+    const double nodes = double(view_shape(frame).count()) * light_shape(frame).count();
+    return ClusterVolume::check(nodes * components * std::min(clusters, frame.texel_count()) *
                                     double(bytes_per_texel(format())),
                                 code,
                                 doing);
@@ -66,9 +74,9 @@ class RevisedLpca final : public Material {
       : frame_(std::move(frame)),
         layout_(layout),
         factors_(std::move(factors)),
-        views_(frame_.views, DirectionRole::kView, layout.angular),
-        lights_(frame_.lights, DirectionRole::kLight, layout.angular),
-        place_(factors_.clusters, views_.nodes(), lights_.nodes(), layout.components) {
+        views_(frame_.views, DirectionRole::kView, layout.view_shape(frame_)),
+        lights_(frame_.lights, DirectionRole::kLight, layout.light_shape(frame_)),
+        place_(factors_.clusters, views_.shape(), lights_.shape(), layout.components) {
     fill_volume();
   }
 
@@ -121,6 +129,7 @@ class RevisedLpca final : public Material {
     contents.metadata["components"] = fmt::format("{}", layout_.components);
     contents.metadata["angular"] = fmt::format("{}", layout_.angular);
     contents.metadata["precision"] = name_of(layout_.precision);
+    add_boxes(layout_.boxes, contents);
     add_factors(factors_, frame_.texel_count(), contents);
     return contents;
   }
@@ -293,7 +302,7 @@ ModelShader RevisedLpca::shader() const {
   volume.data =
       layout_.precision == Precision::k8Bit ? texture_data(bytes_) : texture_data(halves_);
   shader.textures.push_back(std::move(volume));
-  shader.fetches = texels.words() + 2 * components;
+  shader.fetches = texels.words() + place_.fetches() * components;
   shader.cache = EigenCache{.clusters = factors_.clusters,
                             .layers = eigen_rgb_layers(components),
                             .texel_fetches = texels.words()};
@@ -312,15 +321,18 @@ Result<std::unique_ptr<Material>> fit_revised_lpca(const SampleSet& set,
   VENEER_ASSIGN(layout.components, parse_one_term(options.components, kName));
   VENEER_ASSIGN(layout.precision, parse_precision(options.precision, Precision::k8Bit, kName));
   layout.angular = options.angular;
-  MaterialFrame frame = frame_of(set.info());
+  VENEER_ASSIGN(const FittedPairs pairs, FittedPairs::of(set.info(), options.region));
+  layout.boxes = pairs.boxes();
+  const MaterialFrame& frame = pairs.frame();
   VENEER_TRY(layout.check(frame, options.clusters, Errc::kInvalidOption, "fit"));
   VENEER_TRY(check_samples(set, options));
   RowSource source;
   source.rows = frame.texel_count();
   source.part_columns = {frame.pair_count() * 3};
-  source.read = [&set](int texel, std::span<float> rgb) { set.rgb(texel, Part::kTotal, rgb); };
-  LpcaFactors factors = fit_factors(source, {layout.components}, options, progress);
-  return std::make_unique<RevisedLpca>(std::move(frame), layout, std::move(factors));
+  source.read = [&](int texel, std::span<float> rgb) { pairs.rgb(set, texel, Part::kTotal, rgb); };
+  LpcaFactors factors =
+      fit_factors(source, {layout.components}, pairs.column_weights(3), options, progress);
+  return std::make_unique<RevisedLpca>(frame, layout, std::move(factors));
 }
 
 Result<std::unique_ptr<Material>> load_revised_lpca(const SafetensorsFile& file) {
@@ -331,6 +343,7 @@ Result<std::unique_ptr<Material>> load_revised_lpca(const SafetensorsFile& file)
   VENEER_ASSIGN(layout.angular,
                 read_integer(file, "angular", FitOptions::kLeastAngular, FitOptions::kMostAngular));
   VENEER_ASSIGN(layout.precision, read_precision(file, kName));
+  VENEER_ASSIGN(layout.boxes, read_boxes(file));
   VENEER_ASSIGN(LpcaFactors factors,
                 read_factors(file, frame.texel_count(), layout.components, 3 * frame.pair_count()));
   VENEER_TRY(layout.check(frame, factors.clusters, Errc::kBadFormat, doing));

@@ -207,7 +207,8 @@ Result<std::unique_ptr<Material>> fit_scaled_lafortune(const SampleSet& set,
   VENEER_TRY(refuse_mip_levels(options, kName));
   VENEER_TRY(refuse_form(options, kName));
   VENEER_TRY(refuse_precision(options, kName));
-  MaterialFrame frame = frame_of(set.info());
+  VENEER_ASSIGN(const FittedPairs pairs, FittedPairs::of(set.info(), options.region));
+  const MaterialFrame& frame = pairs.frame();
   VENEER_TRY(check_textures(frame, options.lobes, Errc::kInvalidOption, "fit"));
   VENEER_TRY(set.check_finite());
 
@@ -217,12 +218,13 @@ Result<std::unique_ptr<Material>> fit_scaled_lafortune(const SampleSet& set,
   const std::size_t values = 3 * frame.views.size();  // of a texel's factors
   std::vector<Eigen::half> factors(values * static_cast<std::size_t>(frame.texel_count()));
   std::atomic<int> fallbacks = 0;
+  const std::vector<float> importance = pairs.weights_everywhere();
   progress.start("scaled lobes", frame.texel_count());
   parallel_for(frame.texel_count(), 8, [&](std::int64_t begin, std::int64_t end) {
     std::vector<float> rgb(3 * static_cast<std::size_t>(frame.pair_count()));
     for (auto texel = static_cast<int>(begin); texel < end; ++texel) {
-      set.rgb(texel, Part::kTotal, rgb);
-      const LobeTargets targets = weighted_targets(rgb);
+      pairs.rgb(set, texel, Part::kTotal, rgb);
+      const LobeTargets targets = weighted_targets(rgb, importance);
       TexelFit fit = fit_texel(fitter, targets);
       Factors best = factors_of(fitter, targets, fit.stored, lights);
       if (!fit.fell_back) {
@@ -247,7 +249,7 @@ Result<std::unique_ptr<Material>> fit_scaled_lafortune(const SampleSet& set,
   });
   lobes.fallback_texels = fallbacks;
   progress.finish(fallback_remark(fallbacks));
-  return std::make_unique<ScaledLafortune>(std::move(frame), std::move(lobes), std::move(factors));
+  return std::make_unique<ScaledLafortune>(frame, std::move(lobes), std::move(factors));
 }
 
 Result<std::unique_ptr<Material>> load_scaled_lafortune(const SafetensorsFile& file) {

@@ -7,6 +7,7 @@
 
 #include "base/parallel.h"
 #include "btf/models/components.h"
+#include "btf/models/fitted_pairs.h"
 #include "btf/models/lpca_factors.h"
 #include "btf/models/packed_lpca.h"
 
@@ -25,10 +26,12 @@ using Samples = Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::
 using Basis = Eigen::Matrix<float, kColours, 3, Eigen::RowMajor>;
 using HalfBasis = Eigen::Matrix<Eigen::half, kColours, 3, Eigen::RowMajor>;
 
-Basis colour_basis(const Samples& samples) {
+// @param weights  of the samples
+Basis colour_basis(const Samples& samples, const Eigen::VectorXd& weights) {
   // In double: float would lose the second colour of an almost grey texel.
   const Eigen::Matrix<double, Eigen::Dynamic, 3> precise = samples.cast<double>();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(precise.transpose() * precise);
+  const Eigen::Matrix<double, Eigen::Dynamic, 3> weighted = weights.asDiagonal() * precise;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(precise.transpose() * weighted);
   Basis basis;
   for (int c = 0; c < kColours; ++c) {
     Eigen::Vector3d colour = solver.eigenvectors().col(2 - c);
@@ -36,7 +39,7 @@ Basis colour_basis(const Samples& samples) {
     // 0.
     int largest = 0;
     colour.cwiseAbs().maxCoeff(&largest);
-    const double sign = c == 0 ? precise.colwise().sum().dot(colour) : colour[largest];
+    const double sign = c == 0 ? weighted.colwise().sum().dot(colour) : colour[largest];
     basis.row(c) = (sign < 0.0 ? -colour : colour).cast<float>();
   }
   return basis;
@@ -109,9 +112,11 @@ Result<std::unique_ptr<Material>> fit_texel_colours(const SampleSet& set,
   VENEER_TRY(refuse_precision(options, kName));
   VENEER_ASSIGN(const PackedLpca::Components components,
                 parse_two_terms(options.components, kName));
-  const MaterialFrame frame = frame_of(set.info());
+  VENEER_ASSIGN(const FittedPairs pairs, FittedPairs::of(set.info(), options.region));
+  const MaterialFrame& frame = pairs.frame();
   const PackedLpca::Layout layout{.components = components,
                                   .angular = options.angular,
+                                  .boxes = pairs.boxes(),
                                   .colours = kColours,
                                   .mip_levels = options.mip_levels};
   VENEER_TRY(PackedLpca::check(frame, layout, options.clusters, Errc::kInvalidOption, "fit"));
@@ -120,14 +125,15 @@ Result<std::unique_ptr<Material>> fit_texel_colours(const SampleSet& set,
 
   const TexelPyramid pyramid(frame.width, frame.height, options.mip_levels);
   const RowRange own = rows_of_rank(pyramid.texel_count(), *options.ranks);
+  const Eigen::VectorXd weights = pairs.all_weights().cast<double>().matrix();
   progress.start("colours", own.count);
   std::vector<Eigen::half> colours(static_cast<std::size_t>(own.count) * kColours * 3);
   parallel_for(own.count, 16, [&](std::int64_t begin, std::int64_t end) {
     std::vector<float> rgb(values);
     for (auto i = static_cast<int>(begin); i < end; ++i) {
-      pyramid_rgb(set, pyramid, own.first + i, Part::kTotal, rgb);
+      pairs.rgb(set, pyramid, own.first + i, Part::kTotal, rgb);
       Eigen::Map<HalfBasis>(colours.data() + 3 * kColours * i) =
-          colour_basis(Samples(rgb.data(), frame.pair_count(), 3)).cast<Eigen::half>();
+          colour_basis(Samples(rgb.data(), frame.pair_count(), 3), weights).cast<Eigen::half>();
     }
     progress.advance(end - begin);
   });
@@ -136,14 +142,14 @@ Result<std::unique_ptr<Material>> fit_texel_colours(const SampleSet& set,
 
   const auto read = [&](int texel, std::span<float> first, std::span<float> second) {
     std::vector<float> rgb(values);
-    pyramid_rgb(set, pyramid, texel, Part::kTotal, rgb);
+    pairs.rgb(set, pyramid, texel, Part::kTotal, rgb);
     const Samples samples(rgb.data(), frame.pair_count(), 3);
     const Basis basis =
         Eigen::Map<const HalfBasis>(colours.data() + 3 * kColours * texel).cast<float>();
     Eigen::Map<Eigen::VectorXf>(first.data(), samples.rows()) = samples * basis.row(0).transpose();
     Eigen::Map<Eigen::VectorXf>(second.data(), samples.rows()) = samples * basis.row(1).transpose();
   };
-  VENEER_ASSIGN(PackedLpca scalars, PackedLpca::fit(frame, options, layout, read, progress));
+  VENEER_ASSIGN(PackedLpca scalars, PackedLpca::fit(pairs, options, layout, read, progress));
   return std::make_unique<TexelColours>(std::move(scalars), std::move(colours));
 }
 
