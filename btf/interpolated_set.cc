@@ -31,7 +31,7 @@ Eigen::Vector3d InterpolatedSet::radiance(int texel,
         sum += weight * Eigen::Map<const Eigen::Vector3<Eigen::half>>(sample + 3).cast<double>();
     }
   }
-  return v.scale * l.scale * sum;
+  return info.scale * v.scale * l.scale * sum;
 }
 
 }  // namespace veneer::btf
