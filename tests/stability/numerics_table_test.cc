@@ -110,8 +110,12 @@ Result<std::unique_ptr<Material>> rounded_otherwise(const Material& material,
                 const auto bits = Eigen::numext::bit_cast<std::uint16_t>(h);
                 const std::uint32_t chance = random.next() % 24;
                 const auto magnitude = static_cast<std::uint16_t>(bits & 0x7fffU);
-                // Zeros are exact: padding, and what was never there.
-                if (chance > 1 || magnitude == 0 || magnitude >= 0x7bffU) return h;
+                // Exact are zeros, the ones that functions are normalised to, and the bounds of
+                // exponents, 1 and 200.
+                constexpr std::uint16_t kOne = 0x3c00;
+                constexpr std::uint16_t kTwoHundred = 0x5a40;
+                if (chance > 1 || magnitude == 0 || magnitude == kOne || magnitude == kTwoHundred)
+                  return h;
                 return Eigen::numext::bit_cast<Eigen::half>(
                     static_cast<std::uint16_t>(chance == 0 ? bits + 1 : bits - 1));
               });
@@ -142,10 +146,11 @@ void print(const std::string& title, const std::vector<Row>& rows) {
   std::fflush(stdout);
 }
 
-// Float16 rounds by 2^-11; what a model sums are a few such numbers.
-constexpr double kMostHalf = 0.02;
-constexpr double kMostGpu = 0.02;
-constexpr double kMostByte = 0.05;
+// Of the rms. Float16 rounds by up to 2^-12 of a number, and models sum a few; bytes by 1/254 and
+// 1/510. GPUs filter with 8 bits of the place between texels, software with more.
+constexpr double kMostHalf = 1e-3;
+constexpr double kMostGpu = 2e-3;
+constexpr double kMostByte = 4e-3;
 
 void table_of(const std::string& title, const SampleSet& set) {
   const TemporaryFolder folder;
@@ -216,7 +221,7 @@ Vector3d truth(int texel, const Direction& view, const Direction& light) {
 // How far beyond the data, which end at 75 degrees, a model's answers still are near the truth.
 TEST(Numerics, PrintsTheTableOfAnglesBeyondTheData) {
   const TemporaryFolder folder;
-  const SampleSet set = glossy_set(folder.path() / "a.btfset");
+  const SampleSet set = glossy_set(folder.path() / "a.btfset", btf::bonn_directions());
   const double range = set.largest_stored(0, 12);
   constexpr std::array kAngles{60.0, 70.0, 75.0, 80.0, 85.0, 89.0};
   std::printf(
@@ -224,7 +229,8 @@ TEST(Numerics, PrintsTheTableOfAnglesBeyondTheData) {
   for (const char* of : {"view", "light"})
     for (const double angle : kAngles) std::printf(" %s %g |", of, angle);
   std::printf("\n|---|%s\n", std::string(kAngles.size() * 2 * 4, '-').c_str());
-  for (const Subject& subject : subjects()) {
+  for (Subject subject : subjects()) {
+    subject.options.angular = 16;
     const auto material = fit(subject, set);
     ASSERT_TRUE(material) << material.error().what;
     std::printf("| %s |", subject.name);
@@ -235,7 +241,7 @@ TEST(Numerics, PrintsTheTableOfAnglesBeyondTheData) {
         for (int i = 0; i < 400; ++i) {
           const double phi = 2.0 * std::numbers::pi * random.uniform();
           const Direction there = btf::direction_from_angles({angle * kDegree, phi});
-          const Direction other = btf::testing::random_direction(random, std::cos(60.0 * kDegree));
+          const Direction other = btf::testing::random_direction(random, std::cos(75.0 * kDegree));
           queries.push_back({i % 12, of_view ? there : other, of_view ? other : there});
         }
         std::vector<Vector3d> wanted;

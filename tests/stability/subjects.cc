@@ -19,11 +19,11 @@ using btf::DirectionSet;
 constexpr double kHalf = 4.0 * 0x1p-11;
 // Steps of 1/127 and of 1/255, of a function's largest value.
 constexpr double kByte = 1.0 / 127.0;
-// Formulas and grids are continuous, the maps of directions to squares to 9e-4 of a cell at folds.
-constexpr double kSmooth = 2e-5;
-// A cell of the table is 1/256 of the square; across it the weights move by that times the
-// triangles in a row. Measured; see docs/NUMERICS.md.
-constexpr double kTable = 0.08;
+// Formulas and grids are continuous: what 1e-7 radians make of them, measured 2.6e-7.
+constexpr double kSmooth = 2e-6;
+// Cells of a table keep one triangle each, so that there is a step where the next cell has another;
+// measured 5.6e-6.
+constexpr double kTable = 5e-5;
 
 btf::FitOptions options_of(const std::string& components) {
   btf::FitOptions options;
@@ -152,8 +152,9 @@ double lambert(const btf::SampleSetInfo& info, int texel, int light, int channel
   return colour(texel, channel) * std::max(info.lights[static_cast<std::size_t>(light)].z(), 0.0);
 }
 
-btf::SampleSet glossy_set(const std::filesystem::path& folder) {
-  const btf::SampleSetInfo info = usual_info();
+btf::SampleSet glossy_set(const std::filesystem::path& folder, const DirectionSet& directions) {
+  btf::SampleSetInfo info = usual_info();
+  info.views = info.lights = directions;
   return btf::testing::make_set(
       folder, info, [&](int texel, int view, int light, int channel) -> float {
         if (channel >= 3) return static_cast<float>(lambert(info, texel, light, channel - 3));

@@ -64,7 +64,9 @@ struct Query {
 [[nodiscard]] double lambert(const btf::SampleSetInfo& info, int texel, int light, int channel);
 
 /// Lambert and a white lobe about the mirror direction.
-[[nodiscard]] btf::SampleSet glossy_set(const std::filesystem::path& folder);
+[[nodiscard]] btf::SampleSet glossy_set(
+    const std::filesystem::path& folder,
+    const btf::DirectionSet& directions = measured_directions());
 
 [[nodiscard]] Result<std::unique_ptr<btf::Material>> fit(const Subject& subject,
                                                          const btf::SampleSet& set);
