@@ -40,7 +40,7 @@ Eigen::Vector3d InterpolatedSet::radiance(int texel, const PairWeights& weights)
         sum += weight * Eigen::Map<const Eigen::Vector3<Eigen::half>>(sample + 3).cast<double>();
     }
   }
-  return v.scale * l.scale * sum;
+  return info.scale * v.scale * l.scale * sum;
 }
 
 }  // namespace veneer::btf

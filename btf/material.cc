@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <functional>
 
 #include "btf/models/components.h"
@@ -15,6 +16,7 @@
 #include "btf/models/revised_lpca/revised_lpca.h"
 #include "btf/models/scaled_lafortune/scaled_lafortune.h"
 #include "btf/models/texel_colours/texel_colours.h"
+#include "btf/scaled_material.h"
 
 namespace veneer::btf {
 namespace {
@@ -22,65 +24,96 @@ namespace {
 constexpr std::string_view kFormat = "veneer-material";
 constexpr std::string_view kVersion = "1";
 
+// Of the set's numbers as they are stored: 1 where factors in float16 have room above and below
+// them, else the power of two that brings the largest to 1 to 2.
+double range_of(const SampleSet& set, Communicator& ranks) {
+  constexpr double kLeast = 1.0 / 256.0;
+  constexpr double kMost = 1024.0;
+  const RowRange own = rows_of_rank(set.info().texel_count(), ranks);
+  const std::array largest{set.largest_stored(own.first, own.count)};
+  const double most = std::ranges::max(gather<double>(ranks, largest));
+  if (most == 0.0 || (most >= kLeast && most <= kMost)) return 1.0;
+  return std::ldexp(1.0, std::ilogb(most));
+}
+
+// Models fit numbers that suit float16, whatever the set's scale is; what they were divided by goes
+// around the material.
+template <auto fit>
+Result<std::unique_ptr<Material>> fit_scaled(const SampleSet& set,
+                                             const FitOptions& options,
+                                             Progress& progress) {
+  VENEER_TRY(options.check());
+  const double range = range_of(set, *options.ranks);
+  VENEER_ASSIGN(auto material, fit(set.with_scale(1.0 / range), options, progress));
+  return with_scale(std::move(material), range * set.info().scale);
+}
+
+template <auto load>
+Result<std::unique_ptr<Material>> load_scaled(const SafetensorsFile& file) {
+  VENEER_ASSIGN(const double scale, read_scale(file));
+  VENEER_ASSIGN(auto material, load(file));
+  return with_scale(std::move(material), scale);
+}
+
 // One line for each model.
 constexpr std::array kModels{
     Model{"dichromatic-lpca",
           "shading times body colour plus specular times light colour (Obara et al. 2006)",
           2,
           true,
-          &fit_dichromatic_lpca,
-          &load_dichromatic_lpca,
+          &fit_scaled<&fit_dichromatic_lpca>,
+          &load_scaled<&load_dichromatic_lpca>,
           true},
     Model{"eigen-texture",
           "pictures of every view, mixed by directions alone (Sattler et al. 2003)",
           1,
           false,
-          &fit_eigen_texture,
-          &load_eigen_texture},
+          &fit_scaled<&fit_eigen_texture>,
+          &load_scaled<&load_eigen_texture>},
     Model{"lafortune",
           "Lafortune lobes under one specular colour (McAllister et al. 2002)",
           0,
           false,
-          &fit_lafortune,
-          &load_lafortune},
+          &fit_scaled<&fit_lafortune>,
+          &load_scaled<&load_lafortune>},
     Model{"lpca",
           "RGB Eigen-BRDFs of texel clusters, nine-fold interpolation (Mueller et al. 2003)",
           1,
           false,
-          &fit_lpca,
-          &load_lpca,
+          &fit_scaled<&fit_lpca>,
+          &load_scaled<&load_lpca>,
           true},
     Model{"phong",
           "a diffuse colour and a white highlight about the mirror direction (Phong 1975)",
           0,
           false,
-          &fit_phong,
-          &load_phong},
+          &fit_scaled<&fit_phong>,
+          &load_scaled<&load_phong>},
     Model{"reflectance-field",
           "for each measured view lobes in the light direction (Meseth et al. 2003)",
           0,
           false,
-          &fit_reflectance_field,
-          &load_reflectance_field},
+          &fit_scaled<&fit_reflectance_field>,
+          &load_scaled<&load_reflectance_field>},
     Model{"revised-lpca",
           "RGB Eigen-BRDFs in a volume that the hardware interpolates (Schneider 2004)",
           1,
           false,
-          &fit_revised_lpca,
-          &load_revised_lpca,
+          &fit_scaled<&fit_revised_lpca>,
+          &load_scaled<&load_revised_lpca>,
           true},
     Model{"scaled-lafortune",
           "Lafortune lobes times a colour for each view (Daubert et al. 2001)",
           0,
           false,
-          &fit_scaled_lafortune,
-          &load_scaled_lafortune},
+          &fit_scaled<&fit_scaled_lafortune>,
+          &load_scaled<&load_scaled_lafortune>},
     Model{"texel-colours",
           "two learned colours a texel, scalar Eigen-BRDFs four to a volume (after Schneider 2004)",
           2,
           false,
-          &fit_texel_colours,
-          &load_texel_colours,
+          &fit_scaled<&fit_texel_colours>,
+          &load_scaled<&load_texel_colours>,
           true},
 };
 static_assert(std::ranges::is_sorted(kModels, {}, &Model::name));

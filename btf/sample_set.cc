@@ -66,7 +66,9 @@ Result<SetToml> read_set_toml(const std::filesystem::path& path) {
          set.channels == internal::channel_names(false) ||
              set.channels == internal::channel_names(true),
          "expected R, G, B or specular.R, specular.G, specular.B, diffuse.R, diffuse.G, diffuse.B");
-  expect("scale", set.scale == 1.0, "expected 1: samples are stored in their unit");
+  expect("scale",
+         set.scale >= kLeastScale && set.scale <= kMostScale,
+         "expected 1e-25 to 1e25: a sample is what is stored times the scale");
   expect("cosine", set.cosine == "included", "expected \"included\"");
   VENEER_TRY(as_bad_format(toml.finish()));
   return set;
@@ -140,6 +142,13 @@ Status check_info(const SampleSetInfo& info, Errc code, std::string_view doing) 
                   equal->first,
                   equal->second);
   }
+  if (!(info.scale >= kLeastScale && info.scale <= kMostScale))
+    return fail(code,
+                "{}: the scale is {}; it must be {} to {}",
+                doing,
+                info.scale,
+                kLeastScale,
+                kMostScale);
   // Three floats for every pair must be countable in an int (SampleSet::rgb).
   const auto pairs =
       static_cast<std::int64_t>(info.views.size()) * static_cast<std::int64_t>(info.lights.size());
@@ -148,6 +157,15 @@ Status check_info(const SampleSetInfo& info, Errc code, std::string_view doing) 
 }
 
 }  // namespace internal
+
+double scale_for(double largest) {
+  constexpr double kLeast = 1.0 / 16.0;
+  constexpr double kMost = 65504.0;
+  if (!std::isfinite(largest) || largest <= 0.0 || (largest >= kLeast && largest <= kMost))
+    return 1.0;
+  constexpr int kHigh = 14;
+  return std::clamp(std::ldexp(1.0, std::ilogb(largest) - kHigh), kLeastScale, kMostScale);
+}
 
 SampleSet::SampleSet(std::filesystem::path path,
                      SampleSetInfo info,
@@ -169,6 +187,7 @@ Result<SampleSet> SampleSet::open(const std::filesystem::path& folder) {
   info.height = toml.height;
   info.texel_pitch_mm = toml.texel_pitch_mm;
   info.polarised = toml.channels == internal::channel_names(true);
+  info.scale = toml.scale;
   info.source = toml.source;
   info.licence = toml.licence;
   VENEER_ASSIGN(info.views, read_directions(folder / internal::kViewsName));
@@ -187,32 +206,61 @@ std::span<const Eigen::half> SampleSet::stored(int texel) const {
   return samples_.as<Eigen::half>().subspan(static_cast<std::size_t>(texel) * size, size);
 }
 
+SampleSet SampleSet::with_scale(double scale) const {
+  SampleSet set = *this;
+  SampleSetInfo info = *info_;
+  info.scale = scale;
+  set.info_ = std::make_shared<const SampleSetInfo>(std::move(info));
+  return set;
+}
+
+double SampleSet::largest_stored(int first, int count) const {
+  VENEER_CHECK(first >= 0 && count >= 0 && count <= info_->texel_count() - first);
+  std::mutex mutex;
+  std::uint16_t largest = 0;
+  parallel_for(count, 16, [&](std::int64_t begin, std::int64_t end) {
+    // Finite magnitudes are ordered as their bits are.
+    constexpr std::uint16_t kMagnitude = 0x7fff;
+    constexpr std::uint16_t kInfinite = 0x7c00;
+    std::uint16_t own = 0;
+    for (auto texel = static_cast<int>(first + begin); texel < first + end; ++texel)
+      for (const Eigen::half value : stored(texel)) {
+        const std::uint16_t bits = Eigen::numext::bit_cast<std::uint16_t>(value) & kMagnitude;
+        own = std::max(own, bits < kInfinite ? bits : std::uint16_t{0});
+      }
+    const std::lock_guard lock(mutex);
+    largest = std::max(largest, own);
+  });
+  return static_cast<double>(Eigen::numext::bit_cast<Eigen::half>(largest));
+}
+
 void SampleSet::rgb(int texel, Part part, std::span<float> out) const {
   const Eigen::Index pairs = info_->pair_count();
   VENEER_CHECK(out.size() == static_cast<std::size_t>(pairs) * 3);
   VENEER_CHECK(info_->polarised || part == Part::kTotal);
   const std::span<const Eigen::half> samples = stored(texel);
+  Eigen::Map<Eigen::Array3Xf> rgb(out.data(), 3, pairs);
   if (!info_->polarised) {
     // Eigen converts eight at a time.
     Eigen::Map<Eigen::ArrayXf>(out.data(), pairs * 3) =
         Eigen::Map<const Eigen::Array<Eigen::half, Eigen::Dynamic, 1>>(samples.data(), pairs * 3)
             .cast<float>();
-    return;
+  } else {
+    using Stored = Eigen::Map<const Eigen::Array<Eigen::half, 6, Eigen::Dynamic>>;
+    const Stored all(samples.data(), 6, pairs);
+    switch (part) {
+      case Part::kSpecular:
+        rgb = all.topRows<3>().cast<float>();
+        break;
+      case Part::kDiffuse:
+        rgb = all.bottomRows<3>().cast<float>();
+        break;
+      case Part::kTotal:
+        rgb = all.topRows<3>().cast<float>() + all.bottomRows<3>().cast<float>();
+        break;
+    }
   }
-  using Stored = Eigen::Map<const Eigen::Array<Eigen::half, 6, Eigen::Dynamic>>;
-  const Stored all(samples.data(), 6, pairs);
-  Eigen::Map<Eigen::Array3Xf> rgb(out.data(), 3, pairs);
-  switch (part) {
-    case Part::kSpecular:
-      rgb = all.topRows<3>().cast<float>();
-      return;
-    case Part::kDiffuse:
-      rgb = all.bottomRows<3>().cast<float>();
-      return;
-    case Part::kTotal:
-      rgb = all.topRows<3>().cast<float>() + all.bottomRows<3>().cast<float>();
-      return;
-  }
+  if (info_->scale != 1.0) rgb *= static_cast<float>(info_->scale);
 }
 
 void SampleSet::rgb(int texel, Part part, std::span<const int> pairs, std::span<float> out) const {

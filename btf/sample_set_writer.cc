@@ -3,6 +3,8 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <atomic>
+#include <cmath>
 #include <utility>
 
 #include "base/files.h"
@@ -56,6 +58,13 @@ std::string toml_string(std::string_view text) {
   return result + '"';
 }
 
+// A TOML float that reads back the same.
+std::string toml_number(double value) {
+  std::string text = fmt::format("{}", value);
+  if (text.find_first_of(".e") == std::string::npos) text += ".0";
+  return text;
+}
+
 std::string set_toml(const SampleSetInfo& info) {
   std::vector<std::string> channels;
   for (const std::string& name : internal::channel_names(info.polarised))
@@ -65,9 +74,9 @@ std::string set_toml(const SampleSetInfo& info) {
       "1.\n";
   text += "layout = \"product\"\n";
   text += fmt::format("width = {}\nheight = {}\n", info.width, info.height);
-  text += fmt::format("texel_pitch_mm = {:#}\n", info.texel_pitch_mm);
+  text += fmt::format("texel_pitch_mm = {}\n", toml_number(info.texel_pitch_mm));
   text += fmt::format("channels = [{}]\n", fmt::join(channels, ", "));
-  text += "scale = 1.0\ncosine = \"included\"\n";
+  text += fmt::format("scale = {}\ncosine = \"included\"\n", toml_number(info.scale));
   text += fmt::format(
       "source = {}\nlicence = {}\n", toml_string(info.source), toml_string(info.licence));
   return text;
@@ -82,6 +91,7 @@ struct SampleSetWriter::State {
   StagedFolder folder;
   SafetensorsWriter samples;  // lies in the folder, so it goes first
   std::span<Eigen::half> values;
+  std::atomic<std::int64_t> clamped = 0;
 };
 
 SampleSetWriter::SampleSetWriter(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -109,6 +119,21 @@ std::span<Eigen::half> SampleSetWriter::texel(int texel) {
   const auto size =
       static_cast<std::size_t>(info.pair_count()) * static_cast<std::size_t>(info.channel_count());
   return state_->values.subspan(static_cast<std::size_t>(texel) * size, size);
+}
+
+Eigen::half SampleSetWriter::stored(float sample) {
+  constexpr double kLargest = 65504.0;
+  const double value = static_cast<double>(sample) / state_->info.scale;
+  if (!(std::abs(value) > kLargest)) return Eigen::half(static_cast<float>(value));
+  ++state_->clamped;
+  return Eigen::half(static_cast<float>(std::copysign(kLargest, value)));
+}
+
+std::int64_t SampleSetWriter::clamped() const { return state_->clamped; }
+
+std::string SampleSetWriter::clamped_remark() const {
+  if (clamped() == 0) return {};
+  return fmt::format("{} samples beyond what the set can hold were cut to that", clamped());
 }
 
 Status SampleSetWriter::finish() {

@@ -60,6 +60,10 @@ void SphericalInterpolator::find_border() {
   const auto at = [this](int i) -> const Direction& {
     return directions_[static_cast<std::size_t>(i)];
   };
+  if (directions_.size() == 1) {
+    border_.push_back({0, 0});
+    return;
+  }
   if (triangles_.empty()) {
     // All on one great circle: the arc from end to end. The first direction is turned to each other
     // one by less than half a turn, so the signed turn orders them.
@@ -76,7 +80,6 @@ void SphericalInterpolator::find_border() {
     for (std::size_t i = 0; i < directions_.size(); ++i)
       order.emplace_back(turn(static_cast<int>(i)), static_cast<int>(i));
     std::sort(order.begin(), order.end());
-    if (order.size() == 1) border_.push_back({0, 0});
     for (std::size_t i = 1; i < order.size(); ++i)
       border_.push_back({order[i - 1].second, order[i].second});
     return;

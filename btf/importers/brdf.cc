@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "btf/importers/brdf.h"
 
+#include <algorithm>
+#include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "btf/importers/crop.h"
 
@@ -30,25 +33,30 @@ Status write_brdf(const std::filesystem::path& file,
   info.lights = info.views;
   info.source = source;
   info.licence = licence;
-  VENEER_ASSIGN(SampleSetWriter writer, SampleSetWriter::create(set, info));
-  const std::span<Eigen::half> out = writer.texel(0);
-  std::size_t i = 0;
+  // All before the first is written: they choose the scale.
+  std::vector<float> samples;
+  float largest = 0.0F;
   for (const Direction& view : info.views) {
     for (const Direction& light : info.lights) {
       const Eigen::Vector3d reflected = brdf(view, light);
       for (const double value : reflected) {
-        const Eigen::half sample(static_cast<float>(std::numbers::pi * value));
-        if (!(Eigen::numext::isfinite)(sample))
+        const auto sample = static_cast<float>(std::numbers::pi * value);
+        if (!(std::abs(sample) <= static_cast<float>(kMostScale)))
           return fail(Errc::kBadFormat,
                       "{}: the value {} for view {} and light {} is none that a sample can take",
                       doing,
                       value,
-                      i / 3 / info.lights.size(),
-                      i / 3 % info.lights.size());
-        out[i++] = sample;
+                      samples.size() / 3 / info.lights.size(),
+                      samples.size() / 3 % info.lights.size());
+        largest = std::max(largest, sample);
+        samples.push_back(sample);
       }
     }
   }
+  info.scale = scale_for(static_cast<double>(largest));
+  VENEER_ASSIGN(SampleSetWriter writer, SampleSetWriter::create(set, info));
+  std::ranges::transform(
+      samples, writer.texel(0).begin(), [&writer](float sample) { return writer.stored(sample); });
   return writer.finish();
 }
 

@@ -23,8 +23,9 @@ using ReflectedLight =
 /// Writes a BRDF, which knows no texels, as a set of one texel at every pair of the chosen
 /// directions.
 /// @param source, licence  for SampleSetInfo.
+/// The set's scale is that of its largest sample.
 /// Errors: kInvalidOption (the crop, the directions), kBadFormat (a value that is not finite or
-/// too large for a sample), kIo.
+/// over kMostScale), kIo.
 [[nodiscard]] Status write_brdf(const std::filesystem::path& file,
                                 const std::filesystem::path& set,
                                 const ImportOptions& options,

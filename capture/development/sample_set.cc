@@ -76,7 +76,7 @@ Result<DevelopedSet> write_sample_set(const Developer& developer,
             for (std::size_t c = 0; c < 3; ++c) {
               const float sample = value[static_cast<Eigen::Index>(c)];
               set.light_added += std::max(0.0F, -sample);
-              texel[pair + first + c] = static_cast<Eigen::half>(std::max(0.0F, sample));
+              texel[pair + first + c] = writer.stored(std::max(0.0F, sample));
             }
           };
           put(direction.specular, 0);
@@ -100,7 +100,9 @@ Result<DevelopedSet> write_sample_set(const Developer& developer,
         path.string(),
         masked_where);
   VENEER_TRY(writer.finish());
-  progress.finish(fmt::format("{:.2g} % masked", 100 * set.masked_fraction));
+  const std::string clamped = writer.clamped_remark();
+  progress.finish(fmt::format(
+      "{:.2g} % masked{}{}", 100 * set.masked_fraction, clamped.empty() ? "" : "; ", clamped));
   return set;
 }
 

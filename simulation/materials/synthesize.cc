@@ -29,9 +29,6 @@ constexpr std::array kMaterials{
 };
 static_assert(std::ranges::is_sorted(kMaterials, {}, &HeightFieldMaterial::name));
 
-// Brighter than any half can hold would be infinite; a mirror-like glint is cut there.
-constexpr float kMaxHalf = 65504.0F;
-
 }  // namespace
 
 std::span<const HeightFieldMaterial> height_field_materials() { return kMaterials; }
@@ -80,14 +77,14 @@ Status synthesize(const HeightFieldMaterial& material,
       for (int column = 0; column < options.size; ++column) {
         const int texel = row * options.size + column;
         tracer.trace(texel, samples);
-        std::ranges::transform(samples, writer.texel(texel).begin(), [](float sample) {
-          return Eigen::half(std::min(sample, kMaxHalf));
+        std::ranges::transform(samples, writer.texel(texel).begin(), [&](float sample) {
+          return writer.stored(sample);
         });
       }
       progress.advance();
     }
   });
-  progress.finish();
+  progress.finish(writer.clamped_remark());
   return writer.finish();
 }
 

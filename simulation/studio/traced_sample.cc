@@ -118,6 +118,7 @@ Result<TracedSample> TracedSample::trace(const StudioTruth& truth,
     sample.sum_of_cosines_ += static_cast<float>(light.z());
   sample.texels_.resize(views.size() * lights.size() * static_cast<std::size_t>(size) *
                         static_cast<std::size_t>(size));
+  const auto scale = static_cast<float>(set->info().scale);
   for (int row = 0; row < size; ++row)
     for (int column = 0; column < size; ++column) {
       const auto stored = set->stored(row * size + column);
@@ -126,7 +127,7 @@ Result<TracedSample> TracedSample::trace(const StudioTruth& truth,
         for (int light = 0; light < sample.lights_; ++light) {
           Texel& texel = sample.texels_[sample.place(view, light, column, row)];
           for (const auto part : {&Texel::specular, &Texel::diffuse})
-            for (int c = 0; c < 3; ++c) (texel.*part)[c] = static_cast<float>(stored[at++]);
+            for (int c = 0; c < 3; ++c) (texel.*part)[c] = scale * static_cast<float>(stored[at++]);
         }
     }
   return sample;
