@@ -10,6 +10,7 @@
 
 #include "base/random.h"
 #include "base/testing/temporary_folder.h"
+#include "btf/fit_region.h"
 #include "btf/material.h"
 #include "btf/texel_pyramid.h"
 #include "render/compensate_pass.h"
@@ -79,6 +80,21 @@ btf::FitOptions quick_options(const char* components) {
   return options;
 }
 
+// Parts of the directions that a scene may ask for: a box of both; one light, of a box of views;
+// one view; one light and a line of views.
+std::vector<std::pair<std::string, btf::FitRegion>> regions() {
+  btf::FitRegion part;
+  part.views = {0.45, 0.85, 0.3, 0.7};
+  part.lights = {0.2, 0.5, 0.25, 0.8};
+  btf::FitRegion light = part;
+  light.lights = {0.3, 0.3, 0.6, 0.6};
+  btf::FitRegion view = part;
+  view.views = {0.62, 0.62, 0.4, 0.4};
+  btf::FitRegion line = light;
+  line.views.v_max = line.views.v_min;
+  return {{"in a box", part}, {"one light", light}, {"one view", view}, {"a line", line}};
+}
+
 // Every model in the forms of `components` that it knows: with weights in one texel and in two; and
 // the other ways to keep and to cluster the specular term.
 std::vector<Fitted> fit_all(const btf::SampleSet& set) {
@@ -110,6 +126,15 @@ std::vector<Fitted> fit_all(const btf::SampleSet& set) {
       all.push_back(
           {fmt::format("dichromatic-lpca {} {}", specular, clustering), std::move(*material)});
   }
+  const auto cropped = regions();
+  for (const btf::Model& model : btf::models())
+    for (const auto& [name, region] : cropped) {
+      btf::FitOptions options = quick_options(model.terms == 2 ? "3+1" : "3");
+      options.region = &region;
+      auto material = model.fit(set, options, progress);
+      EXPECT_TRUE(material) << material.error().what;
+      if (material) all.push_back({fmt::format("{} {}", model.name, name), std::move(*material)});
+    }
   btf::FitOptions options = quick_options("3+1");
   options.mip_levels = kMipLevels;
   auto material = (*btf::find_model("texel-colours"))->fit(set, options, progress);

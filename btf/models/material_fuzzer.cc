@@ -7,6 +7,7 @@
 
 #include "base/testing/fuzzing.h"
 #include "base/testing/memory_file.h"
+#include "btf/fit_region.h"
 #include "btf/material.h"
 #include "btf/models/internal_test_models.h"
 
@@ -53,6 +54,12 @@ const std::vector<Contents>& good_materials() {
       options.angular = FitOptions::kLeastAngular;
       options.iterations = 2;  // good enough to be changed, and there at once
       add(model, options);
+      FitRegion region;
+      region.views = {0.4, 0.9, 0.3, 0.7};
+      region.lights = {0.6, 0.6, 0.2, 0.2};
+      options.region = &region;
+      add(model, options);
+      options.region = nullptr;
       if (model.terms == 0) continue;  // lobes have one form
       options.mip_levels = 2;
       options.precision = "float16";
