@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -11,8 +12,12 @@
 #include "base/result.h"
 #include "btf/interpolated_set.h"
 #include "btf/material.h"
+#include "calibration/profile.h"
 #include "render/angular_cache_options.h"
+#include "render/drawing.h"
 #include "render/evaluation.h"
+#include "render/renderer.h"
+#include "render/scene.h"
 
 namespace veneer::render {
 
@@ -74,5 +79,29 @@ struct RenderBenchResult {
 /// kInvalidOption, kUnavailable (no GL 4.5).
 [[nodiscard]] Result<RenderBenchResult> bench_render(const RenderBenchOptions& options,
                                                      Progress& progress);
+
+/// One way to draw a scene, and how it is reported.
+struct NamedLevel {
+  std::string name;
+  Level level;  ///< its material is borrowed for the call
+};
+
+/// Times the draw pass of each level on a scene: its mesh, its lights, the profile's raster times
+/// the level's scale, into half floats with depth. "plain" is the yardstick: the same mesh on the
+/// whole raster, one filtered fetch times the sum of the cosines of all the scene's lights, each
+/// with what arrives of it. All take turns within every frame, and the frames go round the
+/// viewpoints. Ratios are to the plain draw of the same call, so that levels can be timed in
+/// batches. The clock is chosen as bench_render() does. `level`, `next_level`, `fade` and
+/// `dither_seed` of the viewpoints are not read.
+/// @param viewpoints  at least one.  @param frames  timed draws of each, after one round of the
+/// viewpoints (at least two frames) that is not. 3 to 10000.
+/// Errors: kInvalidOption, kBadFormat (Renderer::create), kUnavailable (no GL 4.5, a shader that
+/// the driver refuses).
+[[nodiscard]] Result<RenderBenchResult> time_scene(const Scene& scene,
+                                                   const calibration::ProjectorProfile& profile,
+                                                   std::span<const FrameInput> viewpoints,
+                                                   std::span<const NamedLevel> levels,
+                                                   int frames,
+                                                   Progress& progress);
 
 }  // namespace veneer::render
