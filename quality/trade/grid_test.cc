@@ -80,7 +80,9 @@ TEST(Grid, HoldsOnlyWhatAFitAndARendererTake) {
       for (const Candidate& c : candidates_of(info(side, true), grid, 20, 1)) {
         EXPECT_TRUE(c.fit.check()) << c.name();
         EXPECT_TRUE(c.drawing.check()) << c.name();
-        EXPECT_LE(c.fit.clusters, side * side) << c.name();
+        if (reads_of(c.model).clusters) {
+          EXPECT_LE(c.fit.clusters, side * side) << c.name();
+        }
       }
     }
   }
