@@ -13,10 +13,19 @@ InterpolatedSet::InterpolatedSet(SampleSet set)
 Eigen::Vector3d InterpolatedSet::radiance(int texel,
                                           const Direction& view,
                                           const Direction& light) const {
+  return radiance(texel, weights(view, light));
+}
+
+InterpolatedSet::PairWeights InterpolatedSet::weights(const Direction& view,
+                                                      const Direction& light) const {
+  return {views_.weights(view), lights_.weights(light)};
+}
+
+Eigen::Vector3d InterpolatedSet::radiance(int texel, const PairWeights& weights) const {
   const SampleSetInfo& info = set_.info();
   const std::span<const Eigen::half> samples = set_.stored(texel);
-  const DirectionWeights v = views_.weights(view);
-  const DirectionWeights l = lights_.weights(light);
+  const DirectionWeights& v = weights.view;
+  const DirectionWeights& l = weights.light;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {

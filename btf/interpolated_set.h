@@ -15,6 +15,13 @@ class InterpolatedSet {
   [[nodiscard]] Eigen::Vector3d radiance(int texel,
                                          const Direction& view,
                                          const Direction& light) const;
+  /// The weights of a pair of directions, for many texels.
+  struct PairWeights {
+    DirectionWeights view;
+    DirectionWeights light;
+  };
+  [[nodiscard]] PairWeights weights(const Direction& view, const Direction& light) const;
+  [[nodiscard]] Eigen::Vector3d radiance(int texel, const PairWeights& weights) const;
   [[nodiscard]] const SampleSet& set() const { return set_; }
 
  private:

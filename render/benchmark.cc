@@ -4,28 +4,23 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
-#include <chrono>
+#include <array>
 #include <cmath>
-#include <cstring>
 #include <numbers>
 #include <optional>
-#include <string_view>
 
-#include "base/clock.h"
-#include "base/random.h"
-#include "base/statistics.h"
 #include "render/compensate_pass.h"
 #include "render/draw_pass.h"
 #include "render/egl_context.h"
+#include "render/scene_check.h"
 #include "render/screen_error.h"
+#include "render/turns.h"
 
 namespace veneer::render {
 namespace {
 
 using Eigen::Vector3d;
 
-constexpr int kPlainTexels = 256;  // along a side of the plain texture
-constexpr int kWarmUpFrames = 2;
 // Frames and pixels that are compared with the set: enough for an epsilon steady to about a
 // percent.
 constexpr int kComparedFrames = 3;
@@ -33,8 +28,6 @@ constexpr int kComparedStep = 7;
 constexpr int kComparedPixels = 20'000;
 const DirectionalLight kLight{Vector3d(0.3, -0.4, -0.9).normalized(),
                               Vector3d::Constant(100.0 * std::numbers::pi)};
-constexpr std::string_view kQueryClock = "GL timer query";
-constexpr std::string_view kFinishClock = "steady clock around glFinish";
 
 // A projector at the origin and, half a metre off, a surface that fills its raster and a little
 // more. The machine itself is the simplest there is; what it shows is of no interest here.
@@ -90,31 +83,11 @@ Mesh frame_filling_mesh(const calibration::ProjectorGeometry& g) {
   return mesh;
 }
 
-btf::ModelShader plain_textures() {
-  btf::ModelTexture texture;
-  texture.sampler = "Albedo";
-  texture.format = btf::TexelFormat::kRgba16f;
-  texture.width = texture.height = kPlainTexels;
-  texture.linear = true;
-  Pcg32 random(1);
-  for (int i = 0; i < 4 * kPlainTexels * kPlainTexels; ++i) {
-    const Eigen::half value(static_cast<float>(random.uniform()));
-    const auto* bytes = reinterpret_cast<const std::byte*>(&value);
-    texture.data.insert(texture.data.end(), bytes, bytes + sizeof(value));
-  }
-  btf::ModelShader shader;
-  shader.textures.push_back(std::move(texture));
-  shader.fetches = 1;
-  return shader;
-}
-
 // One thing to time: a draw, or the compensation of what was drawn before it.
 struct Entrant {
   RenderTiming timing;
   std::optional<DrawPass> pass;
   std::optional<CompensatePass> compensate;
-  std::vector<double> query_ms;
-  std::vector<double> finish_ms;
 };
 
 class Bench {
@@ -123,10 +96,10 @@ class Bench {
     const calibration::ProjectorProfile profile = bench_profile(options.width, options.height);
     Bench bench(std::move(context), profile, options.texels_per_pixel);
     const btf::ModelShader plain = plain_textures();
-    VENEER_TRY(bench.add(
-        "plain",
-        plain,
-        DrawPass::create_plain(plain, kLight, bench.repeats(kPlainTexels, kPlainTexels), profile)));
+    VENEER_TRY(bench.add("plain",
+                         plain,
+                         DrawPass::create_plain(
+                             plain, {kLight}, bench.repeats(kPlainTexels, kPlainTexels), profile)));
     for (const auto& [name, material, cache, average_texels, evaluation] : options.materials) {
       const btf::ModelShader shader = material->shader();
       const Eigen::Vector2d repeats = bench.repeats(material->width(), material->height());
@@ -145,15 +118,18 @@ class Bench {
   }
 
   Result<RenderBenchResult> run(const RenderBenchOptions& options, Progress& progress) {
-    progress.start("timing", options.frames);
-    for (int frame = -kWarmUpFrames; frame < options.frames; ++frame) {
-      for (Entrant& entrant : entrants_) time(entrant, frame);
-      if (frame >= 0) progress.advance();
-    }
-    progress.finish();
+    Turns turns(context_, entrants_.size());
+    turns.run(
+        options.frames,
+        [this](std::size_t which, int frame) { draw(entrants_[which], frame); },
+        progress);
+    note_served(options.frames - 1);
     if (options.reference != nullptr)
       VENEER_TRY(compare(*options.reference, options.reference_rays, progress));
-    return summary();
+    RenderBenchResult result;
+    for (const Entrant& entrant : entrants_) result.timings.push_back(entrant.timing);
+    turns.report(result);
+    return result;
   }
 
  private:
@@ -162,14 +138,7 @@ class Bench {
         texels_per_pixel_(texels_per_pixel),
         profile_(std::move(profile)),
         mesh_(frame_filling_mesh(profile_.geometry)),
-        target_(make_texture_2d(GL_RGBA16F, profile_.geometry.width, profile_.geometry.height)),
-        depth_(make_texture_2d(
-            GL_DEPTH_COMPONENT32F, profile_.geometry.width, profile_.geometry.height)),
-        framebuffer_(make_framebuffer()),
-        query_(make_query(GL_TIME_ELAPSED)) {
-    glNamedFramebufferTexture(framebuffer_.id(), GL_COLOR_ATTACHMENT0, target_.id(), 0);
-    glNamedFramebufferTexture(framebuffer_.id(), GL_DEPTH_ATTACHMENT, depth_.id(), 0);
-  }
+        target_(profile_.geometry.width, profile_.geometry.height) {}
 
   // As many repeats as it takes to lay the material side by side.
   [[nodiscard]] Eigen::Vector2d repeats(int width, int height) const {
@@ -181,16 +150,8 @@ class Bench {
   Status add(const std::string& name, const btf::ModelShader& shader, Result<DrawPass> pass) {
     if (!pass) return fail_while(fmt::format("timing {}", name), pass.error());
     Entrant& entrant = entrants_.emplace_back();
-    entrant.timing.name = name;
-    entrant.timing.fetches = shader.fetches;
-    entrant.timing.gpu_bytes = shader.gpu_bytes();
+    entrant.timing = timing_of(name, shader, *pass);
     entrant.pass = std::move(*pass);
-    if (const AngularCache* cache = entrant.pass->cache()) {
-      entrant.timing.fetches = shader.cache->texel_fetches + shader.cache->layers;
-      entrant.timing.gpu_bytes += cache->gpu_bytes();
-    }
-    if (const SurfaceBuffer* surface = entrant.pass->surface())
-      entrant.timing.gpu_bytes += surface->gpu_bytes();
     return {};
   }
 
@@ -219,20 +180,19 @@ class Bench {
     progress.start("comparing on the screen", kComparedFrames);
     for (int i = 0; i < kComparedFrames; ++i) {
       const DrawInput input = input_of(kComparedStep * i);
-      VENEER_ASSIGN(const std::vector<ScreenQuery> queries,
+      const std::array<Light, 1> lights{kLight};
+      VENEER_ASSIGN(const ProbedScreen screen,
                     probe_screen(mesh_,
                                  input,
-                                 kLight,
+                                 lights,
                                  repeats(info.width, info.height),
                                  profile_,
-                                 info,
-                                 kComparedPixels,
-                                 rays));
-      const std::vector<Vector3d> reference = reference_at(set, queries);
+                                 {info.width, info.height, kComparedPixels, rays}));
+      const std::vector<Vector3d> reference = reference_at(set, screen.queries);
       for (std::size_t e = 1; e < entrants_.size(); ++e) {
         if (!entrants_[e].pass) continue;
-        entrants_[e].pass->draw(framebuffer_.id(), mesh_, input);
-        glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.id());
+        entrants_[e].pass->draw(target_.framebuffer.id(), mesh_, input);
+        glBindFramebuffer(GL_READ_FRAMEBUFFER, target_.framebuffer.id());
         glPixelStorei(GL_PACK_ALIGNMENT, 4);
         glPixelStorei(GL_PACK_ROW_LENGTH, 0);
         glReadPixels(0,
@@ -242,7 +202,7 @@ class Bench {
                      GL_RGBA,
                      GL_FLOAT,
                      drawn.data());
-        add_error(drawn, queries, reference, kLight, errors[e]);
+        add_error(drawn, screen.queries, reference, errors[e]);
       }
       progress.advance();
     }
@@ -255,65 +215,51 @@ class Bench {
     return {};
   }
 
-  void time(Entrant& entrant, int frame) {
-    const DrawInput input = input_of(frame);
-    glFinish();
-    const auto start = std::chrono::steady_clock::now();
-    glBeginQuery(GL_TIME_ELAPSED, query_.id());
+  void draw(Entrant& entrant, int frame) {
     if (entrant.pass) {
-      entrant.pass->draw(framebuffer_.id(), mesh_, input);
+      entrant.pass->draw(target_.framebuffer.id(), mesh_, input_of(frame));
     } else {
-      entrant.compensate->run(target_.id(), static_cast<std::uint32_t>(frame));
+      entrant.compensate->run(target_.colour.id(), static_cast<std::uint32_t>(frame));
     }
-    glEndQuery(GL_TIME_ELAPSED);
-    glFinish();
-    const Duration elapsed = std::chrono::steady_clock::now() - start;
-    GLuint64 query_ns = 0;
-    glGetQueryObjectui64v(query_.id(), GL_QUERY_RESULT, &query_ns);
-    if (frame < 0) return;
-    if (entrant.pass && entrant.pass->cache() != nullptr) entrant.timing.served = mesh_.served();
-    entrant.finish_ms.push_back(1e3 * to_seconds(elapsed));
-    entrant.query_ms.push_back(1e-6 * static_cast<double>(query_ns));
   }
 
-  // A query counts the GPU's work alone, so that it may be below the clock, by no more than the
-  // cost of issuing the commands; never above it. Software rasterisers have been seen to count only
-  // the part of a draw that runs on their worker threads.
-  [[nodiscard]] bool queries_are_plausible() const {
-    if (context_.is_software()) return false;
-    return std::ranges::all_of(entrants_, [](const Entrant& entrant) {
-      const double query = quantile(entrant.query_ms, 0.5);
-      return query > 0.0 && query <= 1.05 * quantile(entrant.finish_ms, 0.5);
-    });
-  }
-
-  [[nodiscard]] RenderBenchResult summary() const {
-    const bool use_queries = queries_are_plausible();
-    RenderBenchResult result;
-    result.renderer = context_.description();
-    result.clock = use_queries ? kQueryClock : kFinishClock;
-    for (const Entrant& entrant : entrants_) {
-      const std::vector<double>& ms = use_queries ? entrant.query_ms : entrant.finish_ms;
-      RenderTiming timing = entrant.timing;
-      timing.ms_median = quantile(ms, 0.5);
-      timing.ms_p95 = quantile(ms, 0.95);
-      result.timings.push_back(timing);
+  // Of a frame of each that is not timed, since it is read back.
+  void note_served(int frame) {
+    for (Entrant& entrant : entrants_) {
+      if (!entrant.pass || entrant.pass->cache() == nullptr) continue;
+      draw(entrant, frame);
+      entrant.timing.served = mesh_.served();
     }
-    for (RenderTiming& timing : result.timings)
-      timing.ratio = timing.ms_median / result.timings.front().ms_median;
-    return result;
   }
 
   EglContext context_;  // first, so that it goes last
   double texels_per_pixel_;
   calibration::ProjectorProfile profile_;
   MeshBuffers mesh_;
-  GlTexture target_;
-  GlTexture depth_;
-  GlFramebuffer framebuffer_;
-  GlQuery query_;
+  DrawTarget target_;
   std::vector<Entrant> entrants_;
 };
+
+// The raster of targets that are drawn smaller; whole pixels, over the same field.
+calibration::ProjectorGeometry scaled_raster(const calibration::ProjectorGeometry& full,
+                                             double scale) {
+  calibration::ProjectorGeometry raster = full;
+  raster.width = std::max(static_cast<int>(std::ceil(full.width * scale)), 1);
+  raster.height = std::max(static_cast<int>(std::ceil(full.height * scale)), 1);
+  const double x = static_cast<double>(raster.width) / full.width;
+  const double y = static_cast<double>(raster.height) / full.height;
+  raster.fx *= x;
+  raster.cx *= x;
+  raster.fy *= y;
+  raster.cy *= y;
+  return raster;
+}
+
+Status check_frames(int frames) {
+  if (frames < 3 || frames > 10000)
+    return fail(Errc::kInvalidOption, "timing: {} frames; 3 to 10000 can be timed", frames);
+  return {};
+}
 
 }  // namespace
 
@@ -323,8 +269,7 @@ Status RenderBenchOptions::check() const {
                 "timing: the size is {} x {}; 16 to 8192 each can be timed",
                 width,
                 height);
-  if (frames < 3 || frames > 10000)
-    return fail(Errc::kInvalidOption, "timing: {} frames; 3 to 10000 can be timed", frames);
+  VENEER_TRY(check_frames(frames));
   if (!(texels_per_pixel >= 1.0 / 16 && texels_per_pixel <= 16.0))
     return fail(Errc::kInvalidOption,
                 "timing: {} texels a pixel; 0.0625 to 16 can be drawn",
@@ -354,6 +299,82 @@ Result<RenderBenchResult> bench_render(const RenderBenchOptions& options, Progre
   VENEER_ASSIGN(EglContext context, EglContext::create());
   VENEER_ASSIGN(Bench bench, Bench::create(std::move(context), options));
   return bench.run(options, progress);
+}
+
+Result<RenderBenchResult> time_scene(const Scene& scene,
+                                     const calibration::ProjectorProfile& profile,
+                                     std::span<const FrameInput> viewpoints,
+                                     std::span<const NamedLevel> levels,
+                                     int frames,
+                                     Progress& progress) {
+  VENEER_TRY(check_frames(frames));
+  VENEER_TRY(check_drawable(scene));
+  VENEER_TRY(profile.check());
+  if (viewpoints.empty())
+    return fail(Errc::kInvalidOption, "timing a scene: from no viewpoint; give one or more");
+  for (const NamedLevel& level : levels) {
+    VENEER_CHECK(level.level.material != nullptr);
+    if (const Status status = level.level.drawing.check(); !status)
+      return fail_while(fmt::format("timing {}", level.name), status.error());
+  }
+  VENEER_ASSIGN(const EglContext context, EglContext::create());
+  const MeshBuffers mesh(scene.mesh);
+
+  struct Draw {
+    DrawPass pass;
+    DrawTarget target;
+  };
+  std::vector<Draw> draws;
+  RenderBenchResult result;
+  const auto add = [&](const std::string& name,
+                       const btf::ModelShader& shader,
+                       const calibration::ProjectorGeometry& raster,
+                       Result<DrawPass> pass) -> Status {
+    if (!pass) return fail_while(fmt::format("timing {}", name), pass.error());
+    result.timings.push_back(timing_of(name, shader, *pass));
+    draws.push_back({std::move(*pass), DrawTarget(raster.width, raster.height)});
+    return {};
+  };
+  const btf::ModelShader plain = plain_textures();
+  VENEER_TRY(add("plain",
+                 plain,
+                 profile.geometry,
+                 DrawPass::create_plain(plain, scene.lights, scene.texture_repeats, profile)));
+  for (const auto& [name, level] : levels) {
+    const btf::ModelShader shader = level.material->shader();
+    const DrawingOptions& drawing = level.drawing;
+    calibration::ProjectorProfile scaled = profile;
+    scaled.geometry = scaled_raster(profile.geometry, drawing.scale);
+    VENEER_TRY(
+        add(name,
+            shader,
+            scaled.geometry,
+            DrawPass::create(shader,
+                             scene.lights,
+                             scene.texture_repeats,
+                             scaled,
+                             {.cache = drawing.cache,
+                              .filter = texel_filter(*level.material, drawing.average_texels),
+                              .evaluation = drawing.evaluation})));
+  }
+
+  const auto draw = [&](std::size_t which, int frame) {
+    const auto count = static_cast<int>(viewpoints.size());
+    const FrameInput& from =
+        viewpoints[static_cast<std::size_t>(((frame % count) + count) % count)];
+    draws[which].pass.draw(draws[which].target.framebuffer.id(),
+                           mesh,
+                           {from.eye_in_world, from.world_from_object, from.specular_weight});
+  };
+  Turns turns(context, draws.size());
+  turns.run(frames, draw, progress);
+  turns.report(result);
+  for (std::size_t i = 0; i < draws.size(); ++i) {
+    if (draws[i].pass.cache() == nullptr) continue;
+    draw(i, 0);  // once more, since this is read back
+    result.timings[i].served = mesh.served();
+  }
+  return result;
 }
 
 }  // namespace veneer::render

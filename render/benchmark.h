@@ -93,10 +93,9 @@ struct NamedLevel {
 /// viewpoints. Ratios are to the plain draw of the same call, so that levels can be timed in
 /// batches. The clock is chosen as bench_render() does. `level`, `next_level`, `fade` and
 /// `dither_seed` of the viewpoints are not read.
-/// @param viewpoints  at least one.  @param frames  timed draws of each, after one round of the
-/// viewpoints (at least two frames) that is not. 3 to 10000.
-/// Errors: kInvalidOption, kBadFormat (Renderer::create), kUnavailable (no GL 4.5, a shader that
-/// the driver refuses).
+/// @param viewpoints  at least one.  @param frames  timed draws of each, after two that are not. 3
+/// to 10000. Errors: kInvalidOption, kBadFormat (Renderer::create), kUnavailable (no GL 4.5, a
+/// shader that the driver refuses).
 [[nodiscard]] Result<RenderBenchResult> time_scene(const Scene& scene,
                                                    const calibration::ProjectorProfile& profile,
                                                    std::span<const FrameInput> viewpoints,

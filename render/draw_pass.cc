@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/draw_pass.h"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <numbers>
@@ -25,6 +26,9 @@ constexpr char kDrawFrag[] =
 
 constexpr char kPlainFrag[] =
 #include "render/shaders/plain.frag.inc"
+    ;
+constexpr char kProbeFrag[] =
+#include "render/shaders/probe.frag.inc"
     ;
 
 // The block Frame of frame.glsl, with room for every light; a program reads as much as it declares.
@@ -87,7 +91,13 @@ std::string draw_fragment_source(const std::string& model_source,
          radiance_source("btf_radiance(uv, view, light)", filter) + kDrawFrag;
 }
 
-std::string plain_fragment_source() { return header(1) + kPlainFrag; }
+std::string plain_fragment_source(int light_count, bool point_lights) {
+  return surface_header(light_count) + (point_lights ? "#define POINT_LIGHTS\n" : "") + kPlainFrag;
+}
+
+std::string probe_fragment_source(int light_count) {
+  return surface_header(light_count) + kProbeFrag;
+}
 
 DrawPass::DrawPass(std::vector<Light> lights,
                    const Eigen::Vector2d& texture_repeats,
@@ -114,7 +124,7 @@ Status DrawPass::link(const std::string& fragment_source, const btf::ModelShader
       program_,
       link_program(
           {{GL_VERTEX_SHADER, "draw.vert", draw_vertex_source(static_cast<int>(lights_.size()))},
-           {GL_FRAGMENT_SHADER, "draw.frag or plain.frag", fragment_source}}));
+           {GL_FRAGMENT_SHADER, "draw.frag, plain.frag or probe.frag", fragment_source}}));
   VENEER_ASSIGN(textures_, ModelTextures::upload(textures, program_.id()));
   return {};
 }
@@ -168,11 +178,23 @@ Status DrawPass::add_cache(const btf::ModelShader& shader, const DrawOptions& op
 }
 
 Result<DrawPass> DrawPass::create_plain(const btf::ModelShader& textures,
-                                        const DirectionalLight& light,
+                                        std::vector<Light> lights,
                                         const Eigen::Vector2d& texture_repeats,
                                         const calibration::ProjectorProfile& profile) {
-  DrawPass pass({light}, texture_repeats, profile);
-  VENEER_TRY(pass.link(plain_fragment_source(), textures));
+  const auto light_count = static_cast<int>(lights.size());
+  const bool point_lights = std::ranges::any_of(
+      lights, [](const Light& light) { return std::holds_alternative<PointLight>(light); });
+  DrawPass pass(std::move(lights), texture_repeats, profile);
+  VENEER_TRY(pass.link(plain_fragment_source(light_count, point_lights), textures));
+  return pass;
+}
+
+Result<DrawPass> DrawPass::create_probe(std::vector<Light> lights,
+                                        const Eigen::Vector2d& texture_repeats,
+                                        const calibration::ProjectorProfile& profile) {
+  const auto light_count = static_cast<int>(lights.size());
+  DrawPass pass(std::move(lights), texture_repeats, profile);
+  VENEER_TRY(pass.link(probe_fragment_source(light_count), {}));
   return pass;
 }
 

@@ -44,7 +44,10 @@ inline constexpr double kNearPlane = 0.01;  // metres
                                                int light_count,
                                                const TexelFilter& filter = {});
 /// The same for the benchmark's yardstick, plain.frag, which reads the texture "Albedo".
-[[nodiscard]] std::string plain_fragment_source();
+/// @param point_lights  whether any of them is one.
+[[nodiscard]] std::string plain_fragment_source(int light_count, bool point_lights);
+/// The same for reading back what each pixel asks, probe.frag.
+[[nodiscard]] std::string probe_fragment_source(int light_count);
 
 /// Where a frame is seen from and drawn on.
 struct DrawInput {
@@ -64,9 +67,13 @@ class DrawPass {
                                                const Eigen::Vector2d& texture_repeats,
                                                const calibration::ProjectorProfile& profile,
                                                const DrawOptions& options = {});
-  /// The yardstick of the benchmark, for one directional light; `textures` holds "Albedo".
+  /// The yardstick of the benchmark; `textures` holds "Albedo".
   [[nodiscard]] static Result<DrawPass> create_plain(const btf::ModelShader& textures,
-                                                     const DirectionalLight& light,
+                                                     std::vector<Light> lights,
+                                                     const Eigen::Vector2d& texture_repeats,
+                                                     const calibration::ProjectorProfile& profile);
+  /// What each pixel asks, into as many colour attachments as probe.frag has outputs.
+  [[nodiscard]] static Result<DrawPass> create_probe(std::vector<Light> lights,
                                                      const Eigen::Vector2d& texture_repeats,
                                                      const calibration::ProjectorProfile& profile);
   /// From the next draw on, where another profile says that the projector stands; its raster is the

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// For the tests of render/ only.
+// For the tests of render/, and of quality/, which measures what it draws.
 
 #include <cmath>
 #include <string>

@@ -15,6 +15,7 @@
 #include "render/prepared_profile.h"
 #include "render/scanout_buffers.h"
 #include "render/scanout_pass.h"
+#include "render/scene_check.h"
 
 namespace veneer::render {
 namespace {
@@ -24,49 +25,6 @@ std::chrono::nanoseconds thread_time() {
   timespec used{};
   ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
   return std::chrono::seconds(used.tv_sec) + std::chrono::nanoseconds(used.tv_nsec);
-}
-
-bool is_finite(const DirectionalLight& light) {
-  return light.direction_to_light.allFinite() && light.illuminance_rgb.allFinite();
-}
-bool is_finite(const PointLight& light) {
-  return light.position.allFinite() && light.intensity_rgb.allFinite();
-}
-
-Status check(const Scene& scene) {
-  const Mesh& mesh = scene.mesh;
-  if (scene.lights.empty() || scene.lights.size() > kMaxLights)
-    return fail(Errc::kBadFormat,
-                "making a renderer: the scene has {} lights; 1 to {} can be drawn",
-                scene.lights.size(),
-                kMaxLights);
-  const std::size_t count = mesh.positions.size();
-  if (mesh.triangles.empty() || mesh.normals.size() != count ||
-      mesh.texture_coordinates.size() != count)
-    return fail(Errc::kBadFormat,
-                "making a renderer: the mesh has {} triangles, {} positions, {} normals and {} "
-                "texture coordinates; it needs triangles, and one of the others for every vertex",
-                mesh.triangles.size(),
-                count,
-                mesh.normals.size(),
-                mesh.texture_coordinates.size());
-  for (const auto& triangle : mesh.triangles) {
-    for (const std::uint32_t vertex : triangle) {
-      if (vertex >= count)
-        return fail(Errc::kBadFormat,
-                    "making a renderer: a triangle of the mesh names vertex {} of {}",
-                    vertex,
-                    count);
-    }
-  }
-  for (const Light& light : scene.lights) {
-    const bool finite = std::visit([](const auto& l) { return is_finite(l); }, light);
-    if (!finite)
-      return fail(Errc::kBadFormat,
-                  "making a renderer: a light of the scene has a direction, a position or an "
-                  "intensity that is no number; correct the scene");
-  }
-  return {};
 }
 
 // In single precision, as GL gets it.
@@ -264,7 +222,7 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const Scene& scene,
                                                    const calibration::ProjectorProfile& profile,
                                                    const RendererOptions& options,
                                                    const Scanout* scanout) {
-  VENEER_TRY(check(scene));
+  VENEER_TRY(check_drawable(scene));
   auto prepared = PreparedProfile::prepare(profile, options);
   if (!prepared) return fail_while("making a renderer", prepared.error());
   if (scanout != nullptr && scanout->gbm_device == nullptr)

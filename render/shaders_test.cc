@@ -21,9 +21,11 @@ TEST(Shaders, AreValidByTheReferenceCompiler) {
   EXPECT_EQ(glslang_complaints(fullscreen_vertex_source(), "vert"), "");
   EXPECT_EQ(glslang_complaints(count_compute_source(), "comp"), "");
   EXPECT_EQ(glslang_complaints(scanout_fragment_source(), "frag"), "");
-  EXPECT_EQ(glslang_complaints(plain_fragment_source(), "frag"), "");
   for (const int lights : {1, kMaxLights}) {
     EXPECT_EQ(glslang_complaints(draw_vertex_source(lights), "vert"), "");
+    EXPECT_EQ(glslang_complaints(probe_fragment_source(lights), "frag"), "");
+    for (const bool point_lights : {false, true})
+      EXPECT_EQ(glslang_complaints(plain_fragment_source(lights, point_lights), "frag"), "");
     EXPECT_EQ(glslang_complaints(draw_fragment_source(kAnyModel, lights), "frag"), "");
     EXPECT_EQ(glslang_complaints(draw_compute_source(kAnyModel, lights), "comp"), "");
     EXPECT_EQ(glslang_complaints(store_surface_fragment_source(lights), "frag"), "");

@@ -1,4 +1,4 @@
-// The yardstick of the benchmark: one filtered fetch times the light's cosine, with the interpolants and
+// The yardstick of the benchmark: one filtered fetch times the lights' cosines, with the interpolants and
 // the target of draw.frag and nothing else of it.
 in Surface {
   vec3 position;
@@ -11,8 +11,16 @@ layout(location = 0) out vec4 target;
 uniform sampler2D Albedo;
 
 void main() {
-  float cosine = max(dot(normalize(surface.normal), frame.lights[0].xyz), 0.0);
-  vec3 rgb = texture(Albedo, fract(surface.uv)).rgb * frame.light_rgb[0].rgb;
+  vec3 normal = normalize(surface.normal);
+  vec3 light = vec3(0.0);
+  for (int i = 0; i < LIGHT_COUNT; ++i) {
+#ifdef POINT_LIGHTS
+    vec4 at = light_at(i, surface.position);
+#else
+    vec4 at = vec4(frame.lights[i].xyz, 1.0);
+#endif
+    light += max(dot(normal, at.xyz), 0.0) * at.w * frame.light_rgb[i].rgb;
+  }
   // Alpha is of no use; it keeps the compiler from dropping the two interpolants that nothing else reads.
-  target = vec4(rgb * cosine, dot(surface.position, surface.tangent));
+  target = vec4(texture(Albedo, fract(surface.uv)).rgb * light, dot(surface.position, surface.tangent));
 }

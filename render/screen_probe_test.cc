@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render/screen_error.h"
+#include "render/screen_probe.h"
 
 #include <gtest/gtest.h>
 
