@@ -229,7 +229,9 @@ TEST(TradePage, DrawsSortsAndShowsCropsInABrowser) {
                             "reflectance-field-lobes1",
                             "lpca-4"};
   EXPECT_EQ(probe["cheapest_first"], cheapest_first);
-  EXPECT_EQ(probe["dearest_first"], json(cheapest_first.rbegin(), cheapest_first.rend()));
+  json dearest_first = cheapest_first;
+  std::reverse(dearest_first.begin(), dearest_first.end());
+  EXPECT_EQ(probe["dearest_first"], dearest_first);
   EXPECT_EQ(probe["by_name"],
             json({"lafortune-lobes1",
                   "lafortune-lobes2",
