@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/result.h"
@@ -26,6 +27,19 @@ struct Candidate {
   /// Of what is fitted alone: candidates that share it share a material.
   [[nodiscard]] std::string fit_key() const;
 };
+
+/// Which fields of btf::FitOptions a model reads beside its components: what its candidates differ
+/// in. Of models that are not known here, all.
+struct FitReads {
+  bool clusters = true;  ///< and how they are found: basis, iterations, seed
+  bool angular = true;
+  bool lobes = true;
+  bool precision = true;
+  bool dichromatic = true;  ///< form, specular, clustering
+  bool mip_levels = true;
+  bool cache = true;  ///< may be drawn from the angular cache
+};
+[[nodiscard]] FitReads reads_of(std::string_view model);
 
 /// What a way to draw costs and how far off it is: a point of the trade.
 struct TradePoint {

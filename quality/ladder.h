@@ -2,10 +2,12 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "base/result.h"
+#include "quality/candidate.h"
 #include "render/drawing.h"
 
 namespace veneer::quality {
@@ -43,5 +45,11 @@ struct Ladder {
 [[nodiscard]] Ladder ladder_of(const std::filesystem::path& material,
                                bool offers_cache,
                                const render::DrawingOptions& best);
+
+/// The measured front of error against time, thinned until each rung costs clearly less than the
+/// one before it and no more than kMost are left. Empty where no point is finite.
+/// @param materials  the folder that holds Candidate::fit_key().safetensors
+[[nodiscard]] Ladder ladder_of(std::span<const TradePoint> points,
+                               const std::filesystem::path& materials);
 
 }  // namespace veneer::quality

@@ -524,9 +524,9 @@ TEST_F(RendererTest, TimesFramesWithoutWaiting) {
   // The GPU's share of the last frame: most of it, and no more than all.
   EXPECT_GT(*gpu_ms, 0.3 * clock_ms.back());
   EXPECT_LT(*gpu_ms, 1.05 * clock_ms.back());
-  // Nearly all of it is the draw pass; the median, as a busy machine stretches any part.
+  // Most of it is the draw pass; the median, as a busy machine stretches any part.
   std::sort(drawn.begin(), drawn.end());
-  EXPECT_GT(drawn[drawn.size() / 2], 0.7);
+  EXPECT_GT(drawn[drawn.size() / 2], 0.5);
 }
 
 // On any doubt dark: a frame whose input is no number shows nothing, and the next one is as ever.

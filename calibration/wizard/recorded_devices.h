@@ -4,9 +4,9 @@
 #include <map>
 #include <string>
 
+#include "base/journal.h"
 #include "calibration/instruments/colorimeter.h"
 #include "calibration/patch_display.h"
-#include "calibration/wizard/journal.h"
 
 namespace veneer::calibration {
 

@@ -54,7 +54,7 @@ struct Recorded {
   std::optional<RecordedDevices> recorded;
 
   explicit Recorded(const std::filesystem::path& folder) {
-    auto opened = Journal::open(folder, {{"a", 1}});
+    auto opened = Journal::open({"test", "opening", "busy", "restart"}, folder, {{"a", 1}});
     VENEER_CHECK(opened.has_value());
     journal.emplace(std::move(*opened));
     recorded.emplace(devices, devices, *journal);

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/journal.h"
 #include "base/progress.h"
 #include "base/result.h"
 #include "calibration/geometry/board.h"
@@ -22,7 +23,6 @@
 #include "calibration/verification.h"
 #include "calibration/wizard/devices.h"
 #include "calibration/wizard/diagnosis.h"
-#include "calibration/wizard/journal.h"
 #include "calibration/wizard/recorded_devices.h"
 
 namespace veneer::calibration {

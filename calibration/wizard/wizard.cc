@@ -4,8 +4,18 @@
 #include <algorithm>
 #include <array>
 
+#include "base/journal.h"
+
 namespace veneer::calibration {
 namespace {
+
+constexpr JournalKind kJournalKind{
+    .format = "veneer-calibration-session",
+    .doing = "opening the session",
+    .busy =
+        "another program is calibrating in it; let that one finish, or name another session "
+        "with --session",
+    .restart = "begin again with --restart"};
 
 constexpr std::array kSteps{
     Step{"projector",
@@ -146,8 +156,9 @@ Result<WizardOutcome> run_wizard(const WizardOptions& options,
         Errc::kInvalidOption,
         "calibrating: there is no camera; take the geometry of an earlier profile over with "
         "--geometry");
-  VENEER_ASSIGN(Journal journal,
-                Journal::open(options.session, identity_of(options, devices), options.restart));
+  VENEER_ASSIGN(
+      Journal journal,
+      Journal::open(kJournalKind, options.session, identity_of(options, devices), options.restart));
   RecordedDevices recorded(*devices.display, *devices.colorimeter, journal);
   if (journal.resumed())
     devices.hands->say(fmt::format("Going on with the session {}: {} findings are there already.",

@@ -21,6 +21,7 @@ Result<int> run_status(CommandLine& line);
 Result<int> run_synthesize(CommandLine& line);
 Result<int> run_tell(CommandLine& line);
 Result<int> run_track(CommandLine& line);
+Result<int> run_trade(CommandLine& line);
 Result<int> run_verify(CommandLine& line);
 
 }  // namespace veneer::cli

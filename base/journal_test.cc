@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "calibration/wizard/journal.h"
+#include "base/journal.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,16 +13,17 @@
 #include "base/files.h"
 #include "base/testing/temporary_folder.h"
 
-namespace veneer::calibration {
+namespace veneer {
 namespace {
 
 using nlohmann::json;
 using testing::HasSubstr;
 
+constexpr JournalKind kKind{"test", "opening", "somebody has it", "begin again with --restart"};
 const json kIdentity{{"projector", "bench"}, {"raster", {640, 480, 8}}};
 
 Result<Journal> open(const TemporaryFolder& folder, const json& identity = kIdentity) {
-  return Journal::open(folder.path() / "session", identity);
+  return Journal::open(kKind, folder.path() / "session", identity);
 }
 std::filesystem::path file_of(const TemporaryFolder& folder) {
   return folder.path() / "session" / "journal.jsonl";
@@ -158,4 +159,4 @@ TEST(Journal, AFullDiskCostsOnlyTheFindingThatDidNotFit) {
 }
 
 }  // namespace
-}  // namespace veneer::calibration
+}  // namespace veneer

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "calibration/wizard/journal.h"
+#include "base/journal.h"
 
 #include <algorithm>
 #include <system_error>
 
-namespace veneer::calibration {
+namespace veneer {
 namespace {
 
 using nlohmann::json;
 
-constexpr std::string_view kFormat = "veneer-calibration-session";
 constexpr int kVersion = 1;
 
 /// "bench: a.toml, not b.toml" for the first thing in which they differ.
@@ -23,28 +22,27 @@ std::string difference(const json& there, const json& here) {
 
 }  // namespace
 
-Result<Journal> Journal::open(const std::filesystem::path& folder,
+Result<Journal> Journal::open(const JournalKind& kind,
+                              const std::filesystem::path& folder,
                               const json& identity,
                               bool restart) {
   const std::filesystem::path path = folder / "journal.jsonl";
-  const std::string doing = fmt::format("opening the session {}", folder.string());
+  const std::string doing = fmt::format("{} {}", kind.doing, folder.string());
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) return fail(Errc::kIo, "{}: {}", doing, error.message());
   auto lines = LockedLines::open(path);
   if (!lines && lines.error().code == Errc::kUnavailable)
-    return fail(Errc::kUnavailable,
-                "{}: another program is calibrating in it; let that one finish, or name another "
-                "session with --session",
-                doing);
+    return fail(Errc::kUnavailable, "{}: {}", doing, kind.busy);
   if (!lines) return fail_while(doing, lines.error());
   if (restart) VENEER_TRY(lines->clear());
   Journal journal(std::move(*lines));
-  if (const Status taken = journal.take(identity); !taken) return fail_while(doing, taken.error());
+  if (const Status taken = journal.take(kind, identity); !taken)
+    return fail_while(doing, taken.error());
   return journal;
 }
 
-Status Journal::take(const json& identity) {
+Status Journal::take(const JournalKind& kind, const json& identity) {
   bool has_header = false;
   const Status taken = lines_.take([&](std::string_view text) -> Result<bool> {
     const json line = json::parse(text, nullptr, /*allow_exceptions=*/false);
@@ -53,13 +51,13 @@ Status Journal::take(const json& identity) {
     };
     if (!line.is_object() || (has_header && !is_text("step"))) return false;
     if (!has_header) {
-      if (line.value("format", json()) != kFormat || line.value("version", json()) != kVersion)
+      if (line.value("format", json()) != kind.format || line.value("version", json()) != kVersion)
         return fail(Errc::kBadFormat, "it was not written by this Veneer");
       if (const json there = line.value("identity", json::object()); there != identity)
         return fail(Errc::kInvalidOption,
-                    "it was begun under other conditions ({}); go on under those, or begin again "
-                    "with --restart",
-                    difference(there, identity));
+                    "it was begun under other conditions ({}); go on under those, or {}",
+                    difference(there, identity),
+                    kind.restart);
       has_header = true;
     } else if (line.contains("value") && is_text("key")) {
       findings_[{line["step"], line["key"]}] = line["value"];
@@ -70,12 +68,11 @@ Status Journal::take(const json& identity) {
     return true;
   });
   if (!taken && taken.error().code == Errc::kBadFormat)
-    return fail(
-        Errc::kBadFormat, "journal.jsonl: {}; begin again with --restart", taken.error().what);
+    return fail(Errc::kBadFormat, "journal.jsonl: {}; {}", taken.error().what, kind.restart);
   VENEER_TRY(taken);
   resumed_ = !findings_.empty();
   if (has_header) return {};
-  return append({{"format", kFormat}, {"version", kVersion}, {"identity", identity}});
+  return append({{"format", kind.format}, {"version", kVersion}, {"identity", identity}});
 }
 
 const json* Journal::find(const std::string& step, const std::string& key) const {
@@ -99,4 +96,4 @@ Status Journal::forget(const std::string& step) {
   return {};
 }
 
-}  // namespace veneer::calibration
+}  // namespace veneer
