@@ -98,7 +98,7 @@ Result<PackedLpca> PackedLpca::fit(const MaterialFrame& frame,
                      std::move(rows)};
   };
   const auto [first, second] = layout.components;
-  if (!layout.separate) {
+  if (!layout.separate && second > 0) {
     const RowSource both = source_of(2, [&](int texel, std::span<float> values) {
       read(texel, values.first(count), values.last(count));
     });
@@ -108,6 +108,9 @@ Result<PackedLpca> PackedLpca::fit(const MaterialFrame& frame,
     std::vector<float> other(count);
     read(texel, values, other);
   });
+  // Without the second function nothing of it decides which texels are alike.
+  if (second == 0)
+    return PackedLpca(frame, layout, fit_factors(firsts, {first}, options, progress), {});
   const RowSource seconds = source_of(1, [&](int texel, std::span<float> values) {
     std::vector<float> other(count);
     read(texel, other, values);
