@@ -26,6 +26,20 @@ double weighted_quantile(std::vector<std::pair<double, double>> values, double r
   return 0;
 }
 
+// Where each of `some` stands in `all`; nothing where one does not.
+std::vector<int> places_in(const btf::DirectionSet& all, const btf::DirectionSet& some) {
+  std::vector<int> places;
+  for (const btf::Direction& direction : some) {
+    // A file keeps single precision.
+    constexpr double kSame = 1e-5;
+    const auto found = std::ranges::find_if(
+        all, [&](const btf::Direction& other) { return (other - direction).norm() < kSame; });
+    if (found == all.end()) return {};
+    places.push_back(static_cast<int>(found - all.begin()));
+  }
+  return places;
+}
+
 int texel_at(double repeats, int size) {
   const double part = repeats - std::floor(repeats);
   return std::clamp(static_cast<int>(part * size), 0, size - 1);
@@ -125,9 +139,10 @@ Result<double> weighted_rmse(const btf::SampleSet& set,
                              const btf::Material& material,
                              const btf::PairWeights& weights) {
   const btf::SampleSetInfo& info = set.info();
-  if (material.width() != info.width || material.height() != info.height ||
-      material.views().size() != info.views.size() ||
-      material.lights().size() != info.lights.size())
+  const std::vector<int> views = places_in(info.views, material.views());
+  const std::vector<int> lights = places_in(info.lights, material.lights());
+  if (material.width() != info.width || material.height() != info.height || views.empty() ||
+      lights.empty())
     return fail(Errc::kBadFormat,
                 "comparing a material with {}: it was fitted on another set, of {} x {} texels, {} "
                 "views and {} lights",
@@ -136,19 +151,26 @@ Result<double> weighted_rmse(const btf::SampleSet& set,
                 material.height(),
                 material.views().size(),
                 material.lights().size());
-  std::vector<float> weight = weights.weight;
-  weight.resize(static_cast<std::size_t>(info.pair_count()), weight.empty() ? 1.0F : 0.0F);
+  // Of the pairs that the material keeps: where they stand in the set, and what they weigh.
+  std::vector<std::size_t> pairs;
+  std::vector<double> weight;
+  for (const int view : views)
+    for (const int light : lights) {
+      pairs.push_back(static_cast<std::size_t>(view) * info.lights.size() +
+                      static_cast<std::size_t>(light));
+      weight.push_back(weights.weight.empty() ? 1.0 : double(weights.weight[pairs.back()]));
+    }
   std::vector<double> squares(static_cast<std::size_t>(info.texel_count()));
   parallel_for(info.texel_count(), 16, [&](std::int64_t begin, std::int64_t end) {
-    std::vector<float> truth(weight.size() * 3);
-    std::vector<float> fitted(truth.size());
+    std::vector<float> truth(static_cast<std::size_t>(info.pair_count()) * 3);
+    std::vector<float> fitted(pairs.size() * 3);
     for (auto texel = static_cast<int>(begin); texel < end; ++texel) {
       set.rgb(texel, btf::Part::kTotal, truth);
       material.reconstruct(texel, fitted);
       double sum = 0;
-      for (std::size_t i = 0; i < truth.size(); ++i) {
-        const double difference = double(fitted[i]) - double(truth[i]);
-        sum += double(weight[i / 3]) * difference * difference;
+      for (std::size_t i = 0; i < fitted.size(); ++i) {
+        const double difference = double(fitted[i]) - double(truth[3 * pairs[i / 3] + i % 3]);
+        sum += weight[i / 3] * difference * difference;
       }
       squares[static_cast<std::size_t>(texel)] = sum;
     }

@@ -70,9 +70,10 @@ class VisibleDifferences {
 };
 
 /// Root mean square of material - set at the measured pairs, from the factors alone
-/// (Material::reconstruct), in linear light over texels and colours, pairs weighted.
+/// (Material::reconstruct), in linear light over texels and colours, pairs weighted. Over the pairs
+/// that the material keeps: fits to a region let go of those without weight.
 /// @param weights  of the set; empty: all alike.
-/// Errors: kBadFormat where material and set differ in size or directions.
+/// Errors: kBadFormat where the material has another size or directions that are not the set's.
 [[nodiscard]] Result<double> weighted_rmse(const btf::SampleSet& set,
                                            const btf::Material& material,
                                            const btf::PairWeights& weights);
