@@ -39,6 +39,7 @@ constexpr std::array kCommands{
         "harness", "Rehearse the daemon with a tracker that fails as planned", &cli::run_harness},
     Command{"import", "Bring measured data of another format to a sample set", &cli::run_import},
     Command{"manual", "Write the manual pages of veneer", &run_manual},
+    Command{"plan", "Fit only what a scene can ask of a material", &cli::run_plan},
     Command{"projector", "Say how a projector is, and switch it", &cli::run_projector},
     Command{"render", "Draw one projector frame of a scene", &cli::run_render},
     Command{"status", "Say how the service is", &cli::run_status},

@@ -10,13 +10,15 @@ Result<std::vector<int>> parse_components(std::string_view text) {
   std::vector<int> components;
   for (std::size_t begin = 0; begin <= text.size();) {
     const std::size_t end = std::min(text.find('+', begin), text.size());
+    const int least = components.empty() ? 1 : 0;
     int value = 0;
     const auto [stop, error] = std::from_chars(text.data() + begin, text.data() + end, value);
-    if (error != std::errc{} || stop != text.data() + end || value < 1 || value > kMostComponents)
+    if (error != std::errc{} || stop != text.data() + end || value < least ||
+        value > kMostComponents)
       return fail(
           Errc::kInvalidOption,
           "fit: components is \"{}\"; it must be one number for each term of the model, joined "
-          "by +, each 1 to {}: for instance 4 or 3+1",
+          "by +, each 1 to {}, or 0 for a second one that is left out: for instance 4, 3+1 or 4+0",
           text,
           kMostComponents);
     components.push_back(value);

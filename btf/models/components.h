@@ -14,7 +14,8 @@ namespace veneer::btf {
 /// Most Eigen-BRDFs of one term.
 inline constexpr int kMostComponents = 16;
 
-/// Reads "4" or "3+1": one number for each term, each 1 to kMostComponents.
+/// Reads "4" or "3+1": one number for each term, each 1 to kMostComponents; a second term may be
+/// left out by 0.
 /// Errors: kInvalidOption, saying what is expected.
 [[nodiscard]] Result<std::vector<int>> parse_components(std::string_view text);
 

@@ -106,7 +106,7 @@ Result<PackedLpca> PackedLpca::fit(const FittedPairs& pairs,
                      std::move(rows)};
   };
   const auto [first, second] = layout.components;
-  if (!layout.separate) {
+  if (!layout.separate && second > 0) {
     const RowSource both = source_of(2, [&](int texel, std::span<float> values) {
       read(texel, values.first(count), values.last(count));
     });
@@ -117,6 +117,10 @@ Result<PackedLpca> PackedLpca::fit(const FittedPairs& pairs,
     std::vector<float> other(count);
     read(texel, values, other);
   });
+  // Without the second function nothing of it decides which texels are alike.
+  if (second == 0)
+    return PackedLpca(
+        frame, layout, fit_factors(firsts, {first}, pairs.weights(), options, progress), {});
   const RowSource seconds = source_of(1, [&](int texel, std::span<float> values) {
     std::vector<float> other(count);
     read(texel, other, values);

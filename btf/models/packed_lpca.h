@@ -21,7 +21,7 @@ namespace veneer::btf {
 ///
 /// The second function may be one of the half angle instead (half_angle.h), in volumes of its own:
 /// one fetch for four components, and a fortieth of the bytes. And it may have clusters of its own,
-/// as many, which are then fetched apart.
+/// as many, which are then fetched apart. Or it may be left out, which makes it 0.
 ///
 /// Sources: Schneider 2004, "Real-time BTF Rendering", section 6.2 (two fetches, the fourth
 /// coordinate mixed by hand); Mueller et al. 2003 (clusters).

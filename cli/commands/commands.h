@@ -15,6 +15,7 @@ Result<int> run_evaluate(CommandLine& line);
 Result<int> run_fit(CommandLine& line);
 Result<int> run_harness(CommandLine& line);
 Result<int> run_import(CommandLine& line);
+Result<int> run_plan(CommandLine& line);
 Result<int> run_projector(CommandLine& line);
 Result<int> run_render(CommandLine& line);
 Result<int> run_status(CommandLine& line);

@@ -170,7 +170,7 @@ class Dichromatic final : public Material {
     return drawn(texel, scalars_.evaluate(texel, view, light), light);
   }
 
-  bool has_specular_term() const override { return true; }
+  bool has_specular_term() const override { return scalars_.components()[1] > 0; }
 
   Eigen::Vector3d diffuse_radiance(int texel,
                                    const Direction& view,
@@ -364,14 +364,15 @@ Result<std::unique_ptr<Material>> fit_dichromatic_lpca(const SampleSet& set,
     own.separate = separate;
     return PackedLpca::fit(pairs, options, own, read, progress);
   };
-  VENEER_ASSIGN(PackedLpca scalars, fit_scalars(options.clustering == kSeparate));
-  if (options.clustering == kMeasured) {
+  const bool has_specular = components[1] > 0;
+  VENEER_ASSIGN(PackedLpca scalars, fit_scalars(has_specular && options.clustering == kSeparate));
+  if (has_specular && options.clustering == kMeasured) {
     VENEER_ASSIGN(PackedLpca separate, fit_scalars(true));
     if (separate.rmse(read, pairs).norm() < kSeparateServes * scalars.rmse(read, pairs).norm())
       scalars = std::move(separate);
   }
   const bool measured = options.specular == kMeasured && !terms.subtractive;
-  if (measured || options.specular == kHalfAngle) {
+  if (has_specular && (measured || options.specular == kHalfAngle)) {
     PackedLpca half_angle = scalars.with_half_angle(read, pairs, *options.ranks);
     if (!measured || serves(half_angle, scalars, read, pairs, progress))
       scalars = std::move(half_angle);

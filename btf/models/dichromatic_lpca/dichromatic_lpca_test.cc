@@ -332,5 +332,35 @@ TEST_F(SeparateClusters, FitASingleTexel) {
   EXPECT_LT(largest_error(one, **material), kHalfTolerance);
 }
 
+// With 0 components of it nothing is kept of the specular term: what is drawn is what the same fit
+// draws without it, in clusters of the diffuse part alone.
+TEST(DichromaticLpca, LeavesOutItsSpecularTermWhereAsked) {
+  const TemporaryFolder folder;
+  const SampleSet set = dichromatic_set(folder.path() / "set.btfset", true);
+  const auto both = fit(kModel, set, options_with("1+1"));
+  const auto diffuse = fit(kModel, set, options_with("1+0"));
+  ASSERT_TRUE(both) << both.error().what;
+  ASSERT_TRUE(diffuse) << diffuse.error().what;
+  const Material* with = both->get();
+  const Material* without = diffuse->get();
+  EXPECT_TRUE(with->has_specular_term());
+  EXPECT_FALSE(without->has_specular_term());
+  EXPECT_LT(without->values_per_texel(), with->values_per_texel());
+  const std::filesystem::path file = folder.path() / "material.safetensors";
+  ASSERT_TRUE(save_material(*without, file, {}));
+  const auto loaded = load_material(file);
+  ASSERT_TRUE(loaded) << loaded.error().what;
+  Pcg32 random(7);
+  for (int i = 0; i < 200; ++i) {
+    const int texel = i % set.info().texel_count();
+    const Direction view = random_direction(random);
+    const Direction light = random_direction(random);
+    const Eigen::Vector3d drawn = without->radiance(texel, view, light);
+    EXPECT_LT((drawn - with->diffuse_radiance(texel, view, light)).norm(), kHalfTolerance);
+    EXPECT_EQ(drawn, without->diffuse_radiance(texel, view, light));
+    EXPECT_EQ(drawn, (*loaded)->radiance(texel, view, light));
+  }
+}
+
 }  // namespace
 }  // namespace veneer::btf

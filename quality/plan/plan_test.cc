@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "quality/plan/plan.h"
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "base/files.h"
+#include "base/testing/temporary_folder.h"
+#include "btf/internal_test_sets.h"
+#include "quality/internal_test_scenes.h"
+#include "quality/plan/plan_report.h"
+
+namespace veneer::quality {
+namespace {
+
+using testing::front_projector;
+using testing::kDegree;
+using testing::plate;
+
+// The normal and two rings.
+btf::DirectionSet nineteen() {
+  btf::DirectionSet directions = btf::testing::ring(6, 0.6);
+  for (int i = 0; i < 12; ++i)
+    directions.push_back(btf::direction_from_angles({1.2, std::numbers::pi * i / 6}));
+  return directions;
+}
+
+// 12 x 12 texels, each of a body colour and a relief of its own, of more kinds than one Eigen-BRDF
+// can tell, under a lobe of the half angle. @param shine  0: matte.
+btf::SampleSet made_set(const std::filesystem::path& folder, bool polarised, double shine) {
+  btf::SampleSetInfo info;
+  info.width = info.height = 12;
+  info.polarised = polarised;
+  info.views = info.lights = nineteen();
+  info.source = "a formula";
+  std::filesystem::create_directories(folder);
+  return btf::testing::make_set(
+      folder / "set.btfset", info, [=](int texel, int view, int light, int channel) {
+        const btf::Direction& v = info.views[static_cast<std::size_t>(view)];
+        const btf::Direction& l = info.lights[static_cast<std::size_t>(light)];
+        Pcg32 random(static_cast<std::uint64_t>(texel) + 1);
+        const auto about_zero = [&](double most) { return most * (2 * random.uniform() - 1); };
+        const double body = (0.2 + 0.1 * (channel % 3)) * (0.4 + 0.6 * random.uniform());
+        const double relief = 1 + about_zero(0.5) * l.x() + about_zero(0.5) * l.y() +
+                              about_zero(0.4) * v.x() + about_zero(0.4) * v.y();
+        const double diffuse = std::max(0.0, body * relief * l.z());
+        const double lobe =
+            shine * (0.5 + 0.5 * random.uniform()) * std::pow((v + l).normalized().z(), 40) * l.z();
+        if (!polarised) return static_cast<float>(diffuse + lobe);
+        return static_cast<float>(channel < 3 ? lobe : diffuse);
+      });
+}
+
+class Planned : public ::testing::Test {
+ protected:
+  Result<Plan> plan(const btf::SampleSet& set,
+                    const render::Scene& scene,
+                    const PlanOptions& options,
+                    const TimeMaterial& time = {}) {
+    SilentProgress silent;
+    return make_plan(set, scene, front_projector(), options, time, silent);
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(Planned, AddsComponentsUntilTheErrorIsNotSeenAndNoFurther) {
+  const btf::SampleSet set = made_set(folder_.path(), false, 0.5);
+  PlanOptions options;
+  options.models = {"revised-lpca"};
+  options.max_de00 = 0.3;
+  const auto made = plan(set, plate(-30, 30, 1), options);
+  ASSERT_TRUE(made) << made.error().what;
+  EXPECT_TRUE(made->is_invisible);
+  EXPECT_TRUE(made->chosen.difference.de00_mean <= 0.3 || made->chosen.difference.codes_mean < 1);
+  // Whatever costs less was seen to be worse.
+  int cheaper = 0;
+  for (const PlanStep& step : made->steps) {
+    if (std::tuple(step.fetches, step.bytes) >=
+        std::tuple(made->chosen.fetches, made->chosen.bytes))
+      continue;
+    ++cheaper;
+    EXPECT_GT(step.difference.de00_mean, 0.3) << step.what;
+    EXPECT_GE(step.difference.codes_mean, 1.0) << step.what;
+  }
+  EXPECT_GT(cheaper, 0);
+  ASSERT_TRUE(made->general && made->general_alike);
+  EXPECT_EQ(made->general->options.components, made->chosen.options.components);
+  EXPECT_LE(made->chosen.bytes, made->general->bytes);
+  EXPECT_LE(made->chosen.fetches, made->general_alike->fetches);
+}
+
+TEST_F(Planned, AsksForMoreWhereLessIsGoodEnough) {
+  const btf::SampleSet set = made_set(folder_.path(), false, 0.5);
+  PlanOptions options;
+  options.compare_general = false;
+  options.models = {"texel-colours", "revised-lpca"};
+  options.max_de00 = 0.1;
+  const auto strict = plan(set, plate(-30, 30, 1), options);
+  options.max_de00 = 5;
+  const auto lax = plan(set, plate(-30, 30, 1), options);
+  ASSERT_TRUE(strict && lax);
+  EXPECT_TRUE(lax->is_invisible);
+  EXPECT_LE(std::tuple(lax->chosen.fetches, lax->chosen.bytes),
+            std::tuple(strict->chosen.fetches, strict->chosen.bytes));
+}
+
+TEST_F(Planned, DropsTheSpecularTermOfAMatteMaterial) {
+  PlanOptions options;
+  options.compare_general = false;
+  options.models = {"dichromatic-lpca"};
+  const btf::SampleSet matte = made_set(folder_.path() / "matte", true, 1e-4);
+  const auto without = plan(matte, plate(-30, 30, 1), options);
+  ASSERT_TRUE(without) << without.error().what;
+  ASSERT_EQ(without->dropped.size(), 1);
+  EXPECT_FALSE(without->chosen.material->has_specular_term());
+  EXPECT_TRUE(without->is_invisible);
+  const btf::SampleSet glossy = made_set(folder_.path() / "glossy", true, 0.5);
+  const auto with = plan(glossy, plate(-30, 30, 1), options);
+  ASSERT_TRUE(with) << with.error().what;
+  EXPECT_TRUE(with->dropped.empty());
+  EXPECT_TRUE(with->chosen.material->has_specular_term());
+}
+
+// The lobe is there in the data, but no eye of this scene comes near it.
+TEST_F(Planned, DropsATermThatTheSceneNeverShows) {
+  PlanOptions options;
+  options.compare_general = false;
+  options.models = {"dichromatic-lpca"};
+  const btf::SampleSet glossy = made_set(folder_.path(), true, 0.5);
+  render::Scene beside = plate(0, 0, 3);
+  beside.observer_region = testing::arc(-3, 3, 60, 3);
+  beside.lights = {render::DirectionalLight{testing::place(0, 62), {300, 300, 300}}};
+  const auto made = plan(glossy, beside, options);
+  ASSERT_TRUE(made) << made.error().what;
+  EXPECT_EQ(made->dropped.size(), 1);
+}
+
+TEST_F(Planned, KeepsToTheTimeOfAFrame) {
+  const btf::SampleSet set = made_set(folder_.path(), false, 0.5);
+  PlanOptions options;
+  options.compare_general = false;
+  options.models = {"revised-lpca"};
+  options.max_de00 = 0.05;
+  // A machine on which a fetch takes a millisecond.
+  const TimeMaterial clock = [](const btf::Material& material) -> Result<double> {
+    return material.shader().fetches;
+  };
+  const auto free = plan(set, plate(-30, 30, 1), options, clock);
+  ASSERT_TRUE(free) << free.error().what;
+  options.frame_ms = free->chosen.fetches - 1;
+  const auto bound = plan(set, plate(-30, 30, 1), options, clock);
+  ASSERT_TRUE(bound) << bound.error().what;
+  EXPECT_LE(*bound->chosen.frame_ms, *options.frame_ms);
+  EXPECT_GE(bound->chosen.difference.de00_mean, free->chosen.difference.de00_mean);
+  options.frame_ms = 0.01;
+  const auto hopeless = plan(set, plate(-30, 30, 1), options, clock);
+  ASSERT_TRUE(hopeless) << hopeless.error().what;
+  EXPECT_NE(plan_text(*hopeless).find("fast enough"), std::string::npos);
+}
+
+TEST_F(Planned, TriesWhatSuitsSetAndScene) {
+  btf::SampleSetInfo info;
+  Reach reach;
+  EXPECT_EQ(planned_models(info, reach),
+            (std::vector<std::string>{"phong", "lafortune", "texel-colours", "revised-lpca"}));
+  info.polarised = true;
+  reach.region.lights = {0.5, 0.51, 0.3, 0.31};
+  EXPECT_EQ(planned_models(info, reach),
+            (std::vector<std::string>{"phong",
+                                      "lafortune",
+                                      "dichromatic-lpca",
+                                      "texel-colours",
+                                      "revised-lpca",
+                                      "eigen-texture"}));
+  for (const std::string& model : planned_models(info, reach)) EXPECT_TRUE(btf::find_model(model));
+}
+
+TEST_F(Planned, TellsWhatItFoundInTextNumbersAndAPage) {
+  const btf::SampleSet set = made_set(folder_.path(), true, 1e-4);
+  PlanOptions options;
+  options.models = {"dichromatic-lpca"};
+  const auto made = plan(set, plate(-30, 30, 1), options);
+  ASSERT_TRUE(made) << made.error().what;
+  const PlanSource source{"a set", "a scene", "a <profile>"};
+  const nlohmann::ordered_json json = plan_json(*made, source);
+  EXPECT_EQ(json["chosen"]["fetches"], made->chosen.fetches);
+  EXPECT_EQ(json["steps"].size(), made->steps.size());
+  EXPECT_EQ(json["dropped"].size(), 1);
+  const std::string text = plan_text(*made);
+  EXPECT_NE(text.find(region_in_words(made->reach)), std::string::npos);
+  EXPECT_NE(text.find("dropped: specular term"), std::string::npos);
+  const auto page = folder_.path() / "plan.html";
+  ASSERT_TRUE(write_plan_page(page, *made, source, set.info()));
+  const auto html = read_text(page);
+  ASSERT_TRUE(html);
+  EXPECT_EQ(html->find("{{DATA}}"), std::string::npos);
+  EXPECT_EQ(html->find("http://www.w3.org/2000/svg"), html->rfind("http"));  // no network
+  const auto material = folder_.path() / "m.safetensors";
+  ASSERT_TRUE(btf::save_material(
+      *made->chosen.material, material, plan_provenance(*made, source, set.info())));
+  const auto file = SafetensorsFile::open(material);
+  ASSERT_TRUE(file);
+  EXPECT_EQ(file->metadata().at("planned_for"), "a scene");
+  EXPECT_EQ(file->metadata().at("planned_region"), region_in_words(made->reach));
+}
+
+TEST_F(Planned, RefusesWhatCannotBePlanned) {
+  const btf::SampleSet set = made_set(folder_.path(), false, 0.5);
+  const auto refusal = [&](const PlanOptions& options, const render::Scene& scene) {
+    const auto made = plan(set, scene, options);
+    return made ? std::string() : made.error().what;
+  };
+  const render::Scene scene = plate(-30, 30, 1);
+  EXPECT_NE(refusal({.max_de00 = 0}, scene).find("max-de00"), std::string::npos);
+  EXPECT_NE(refusal({.max_de00 = NAN}, scene).find("max-de00"), std::string::npos);
+  EXPECT_NE(refusal({.frame_ms = -1}, scene).find("frame-ms"), std::string::npos);
+  EXPECT_NE(refusal({.models = {"velvet"}}, scene).find("velvet"), std::string::npos);
+  EXPECT_NE(refusal({.models = {"dichromatic-lpca"}}, scene).find("specular and diffuse"),
+            std::string::npos);
+  render::Scene blind = scene;
+  blind.observer_region.reset();
+  EXPECT_NE(refusal({}, blind).find("[observer.region]"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace veneer::quality
