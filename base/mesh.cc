@@ -174,17 +174,26 @@ Status check_ply_header(const std::string& path) {
       path);
 }
 
-/// assimp 5.2.5 ends the program where it is to make triangles of faces without corners.
-Status check_faces(const aiScene& scene, const std::string& origin) {
+/// The later steps of assimp 5.2.5 end the program where a part has no face, or a face no corner,
+/// and read past the vertices where a corner is none of them.
+Status check_faces(const aiScene& scene, const std::string& path) {
   for (unsigned i = 0; i < scene.mNumMeshes; ++i) {
     const aiMesh& part = *scene.mMeshes[i];
-    for (unsigned k = 0; k < part.mNumFaces; ++k) {
-      if (part.mFaces[k].mNumIndices == 0)
-        return fail(Errc::kBadFormat,
-                    "reading the mesh {}: face {} of \"{}\" has no corners; export it again",
-                    origin,
-                    k,
-                    part.mName.C_Str());
+    const auto bad = [&](std::string_view why) {
+      return fail(Errc::kBadFormat,
+                  "reading the mesh {}: in the part \"{}\" {}; export it again",
+                  path,
+                  part.mName.C_Str(),
+                  why);
+    };
+    if (part.mNumFaces == 0 || part.mNumVertices == 0) return bad("there is no face");
+    for (unsigned f = 0; f < part.mNumFaces; ++f) {
+      const aiFace& face = part.mFaces[f];
+      if (face.mNumIndices == 0) return bad(fmt::format("face {} has no corner", f));
+      for (unsigned corner = 0; corner < face.mNumIndices; ++corner) {
+        if (face.mIndices[corner] >= part.mNumVertices)
+          return bad(fmt::format("face {} names a vertex that is not there", f));
+      }
     }
   }
   return {};
@@ -220,13 +229,12 @@ Result<Mesh> load_mesh(const std::filesystem::path& path_or_name) {
   // FlipUVs: files count v from the bottom of the texture, Veneer from its first row. SortByPType:
   // points and lines become parts of their own, which may lack texture coordinates and normals.
   const aiScene* scene = importer.ReadFile(origin, 0);
-  if (scene != nullptr) VENEER_TRY(check_faces(*scene, origin));
-  scene = scene == nullptr
-              ? nullptr
-              : importer.ApplyPostProcessing(aiProcess_Triangulate | aiProcess_SortByPType |
-                                             aiProcess_GenSmoothNormals |
-                                             aiProcess_JoinIdenticalVertices |
-                                             aiProcess_PreTransformVertices | aiProcess_FlipUVs);
+  if (scene != nullptr) {
+    VENEER_TRY(check_faces(*scene, origin));
+    scene = importer.ApplyPostProcessing(
+        aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_GenSmoothNormals |
+        aiProcess_JoinIdenticalVertices | aiProcess_PreTransformVertices | aiProcess_FlipUVs);
+  }
   if (scene == nullptr)
     return fail(Errc::kBadFormat, "reading the mesh {}: {}", origin, importer.GetErrorString());
   Mesh mesh;

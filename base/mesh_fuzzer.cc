@@ -54,9 +54,13 @@ const FuzzedReader& fuzzed_reader() {
        "\1ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
        "float z\nproperty float s\nproperty float t\nelement face 1\nproperty list uchar int "
        "vertex_indices\nend_header\n0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 1 2\n"s,
+       // A face without a corner, and one whose corner is no vertex.
        "\1ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
-       "float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n"
-       "0 1 0\n0\n"s,
+       "float z\nproperty float s\nproperty float t\nelement face 1\nproperty list uchar int "
+       "vertex_indices\nend_header\n0 0 0 0 0\n1\0000 0 1 0\n0 1 0 0 1\n3\0\0 1 2\n"s,
+       "\1ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
+       "float z\nproperty float s\nproperty float t\nelement face 1\nproperty list uchar int "
+       "vertex_indices\nend_header\n0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 -1 2\n"s,
        "\2{\"asset\":{\"version\":\"2.0\"},\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{}]}"s,
        "\3glTF"s}};
   return kReader;

@@ -122,19 +122,23 @@ TEST(LoadMesh, RefusesAPlyFileWhoseHeaderDoesNotEnd) {
     }
 }
 
-// assimp would end the program.
-TEST(LoadMesh, RefusesFacesWithoutCorners) {
+TEST(LoadMesh, RefusesFacesWithoutCornersAndCornersThatAreNoVertex) {
   const TemporaryFolder folder;
-  const auto path = folder.path() / "a.ply";
-  ASSERT_TRUE(write_text(path,
-                         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
-                         "property float y\nproperty float z\nelement face 1\n"
-                         "property list uchar int vertex_indices\nend_header\n"
-                         "0 0 0\n1 0 0\n0 1 0\n0\n"));
-  const auto mesh = load_mesh(path);
-  ASSERT_FALSE(mesh);
-  EXPECT_EQ(mesh.error().code, Errc::kBadFormat);
-  EXPECT_NE(mesh.error().what.find("no corners"), std::string::npos) << mesh.error().what;
+  const auto path = folder.path() / "t.ply";
+  for (const auto& [faces, why] : {std::pair{"0\n", "no "},
+                                   std::pair{"3 0 -1 2\n", "not there"},
+                                   std::pair{"3 0 1 7\n", "not there"}}) {
+    ASSERT_TRUE(write_text(
+        path,
+        std::string("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float "
+                    "y\nproperty float z\nproperty float s\nproperty float t\nelement face 1\n"
+                    "property list uchar int vertex_indices\nend_header\n"
+                    "0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n") +
+            faces));
+    const auto mesh = load_mesh(path);
+    ASSERT_FALSE(mesh) << faces;
+    EXPECT_NE(mesh.error().what.find(why), std::string::npos) << mesh.error().what;
+  }
 }
 
 TEST(LoadMesh, ReadsAPlyFileHoweverItsLinesEnd) {

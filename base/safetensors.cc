@@ -62,6 +62,11 @@ std::optional<std::uint64_t> element_count(const std::vector<std::int64_t>& shap
   return count;
 }
 
+bool is_size(const json& number) {
+  return number.is_number_unsigned() &&
+         number.get<std::uint64_t>() <= std::uint64_t{std::numeric_limits<std::int64_t>::max()};
+}
+
 /// A mapped file.
 struct Map {
   std::byte* data = nullptr;
@@ -113,14 +118,14 @@ Status SafetensorsFile::State::parse_tensor(const std::string& name,
   const auto* dtype = std::ranges::find(kDTypes, dtype_name, &DTypeInfo::name);
   if (dtype == kDTypes.end())
     return bad(fmt::format("its type {} is not one that Veneer reads", dtype_name));
-  // What is beyond 64 bits is read as a double, which has no defined value as an integer.
-  const auto are_counts = [](const json& list) {
-    return list.is_array() &&
-           std::ranges::all_of(list, [](const json& n) { return n.is_number_unsigned(); });
-  };
-  if (!are_counts(entry["shape"])) return bad("its shape is no list of whole numbers from 0");
-  if (!are_counts(entry["data_offsets"]))
-    return bad("its offsets are no list of whole numbers from 0");
+  // The library turns 1e30 into an integer by a cast, which is undefined.
+  for (const char* key : {"shape", "data_offsets"}) {
+    const json& numbers = entry[key];
+    if (!numbers.is_array() || !std::ranges::all_of(numbers, &is_size))
+      return bad(fmt::format(
+          "its {} should be a list of whole numbers from 0 to 2^63 - 1; write the file again",
+          key));
+  }
   TensorView view{dtype->dtype, entry["shape"].get<std::vector<std::int64_t>>(), {}};
   const auto offsets = entry["data_offsets"].get<std::vector<std::uint64_t>>();
   if (offsets.size() != 2 || offsets[0] > offsets[1]) return bad("its offsets make no sense");

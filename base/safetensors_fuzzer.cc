@@ -52,8 +52,7 @@ const FuzzedReader& fuzzed_reader() {
                R"("b":{"dtype":"U8","shape":[3],"data_offsets":[16,19]},"__metadata__":{"k":"v"}})",
                19),
        file_of(R"({"a":{"dtype":"F16","shape":[0,9223372036854775807],"data_offsets":[0,0]}})", 0),
-       file_of(R"({"a":{"dtype":"F16","shape":[72036854203685477580700],"data_offsets":[0,0]}})",
-               0),
+       file_of(R"({"a":{"dtype":"F16","shape":[720368542036854775807],"data_offsets":[0,0]}})", 0),
        file_of(R"({"a":{"dtype":"I32","shape":[],"data_offsets":[0,4]}})", 4)}};
   return kReader;
 }
