@@ -71,8 +71,8 @@ Result<GlProbe> GlProbe::create(const btf::Material& material) {
                 render::link_program(
                     {{GL_VERTEX_SHADER, "fullscreen.vert", render::fullscreen_vertex_source()},
                      {GL_FRAGMENT_SHADER, "the model", source_of(shader)}}));
-  VENEER_ASSIGN(render::ModelTextures textures,
-                render::ModelTextures::upload(shader, program.id()));
+  VENEER_ASSIGN(render::ModelTextures textures, render::ModelTextures::upload(shader));
+  render::ModelTextures::assign_units(shader, program.id());
   return GlProbe(std::make_unique<State>(
       State{material.width(), material.height(), std::move(program), std::move(textures)}));
 }
