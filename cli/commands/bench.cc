@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/commands/bench_colour.h"
 #include "cli/commands/bench_fit.h"
+#include "cli/commands/bench_governor.h"
 #include "cli/commands/bench_latency.h"
 #include "cli/commands/bench_query.h"
 #include "cli/commands/bench_render.h"
@@ -15,6 +16,7 @@ Result<int> run_bench(CommandLine& line) {
   std::string evaluation = "fragment";
   std::string model_name = "lpca";
   btf::FitOptions fit;
+  BenchGovernorOptions governor;
   BenchLatencyOptions latency;
   CLI::App& app = line.app();
   app.add_option(
@@ -22,15 +24,18 @@ Result<int> run_bench(CommandLine& line) {
          what,
          "render: what drawing a frame costs with each model; fit: what finding clusters in "
          "a basis gains; query: what asking for a pose costs; colour: how far each colour model is "
-         "from invented projectors; latency: where the time from a pose to its light goes")
+         "from invented projectors; latency: where the time from a pose to its light goes; "
+         "governor: how the deadline is held while a load comes and goes")
       ->required()
-      ->check(CLI::IsMember({"colour", "fit", "latency", "query", "render"}));
+      ->check(CLI::IsMember({"colour", "fit", "governor", "latency", "query", "render"}));
   app.add_option("set",
                  set,
                  "The sample set, NAME.btfset; render takes a small synthetic one by itself, and "
                  "compares what is drawn with a given one");
-  CLI::Option* size = app.add_option(
-      "--size", render.size, "render: pixels, WIDTHxHEIGHT; latency: likewise, 320x240 by itself");
+  CLI::Option* size = app.add_option("--size",
+                                     render.size,
+                                     "render: pixels, WIDTHxHEIGHT; latency and governor: "
+                                     "likewise, 320x240 by itself");
   size->capture_default_str();
   app.add_option("--frames", render.frames, "render: draws of each")->capture_default_str();
   app.add_option("--material",
@@ -65,15 +70,27 @@ Result<int> run_bench(CommandLine& line) {
   app.add_option("--components", fit.components, "fit: Eigen-BRDFs per texel")
       ->capture_default_str();
   app.add_option("--seed", fit.seed, "fit: seed of everything random")->capture_default_str();
-  app.add_option("--seconds", latency.seconds, "latency: how long veneerd runs")
-      ->capture_default_str()
-      ->check(CLI::Range(2.0, 3600.0));
+  CLI::Option* seconds = app.add_option("--seconds",
+                                        latency.seconds,
+                                        "latency: how long veneerd runs; governor: a third before "
+                                        "the load, one under it and one after it, 30 by itself")
+                             ->capture_default_str()
+                             ->check(CLI::Range(2.0, 3600.0));
   app.add_option("--tracker-hz", latency.tracker_hz, "latency: poses a second")
       ->capture_default_str()
       ->check(CLI::Range(1.0, 10000.0));
-  app.add_option("--frame-hz", latency.frame_hz, "latency: frames a second")
+  CLI::Option* frame_hz =
+      app.add_option("--frame-hz",
+                     latency.frame_hz,
+                     "latency: frames a second; governor: likewise, 30 by itself")
+          ->capture_default_str()
+          ->check(CLI::Range(1.0, 1000.0));
+  app.add_option("--busy",
+                 governor.busy_threads,
+                 "governor: threads of the load; 0: one for each processor")
       ->capture_default_str()
-      ->check(CLI::Range(1.0, 1000.0));
+      ->check(CLI::Range(0, 256));
+  app.add_flag("--gate", governor.gate, "governor: exit with 3 where a gate is missed");
   line.parse();
   if (what == "render") {
     render.set = set;
@@ -81,6 +98,12 @@ Result<int> run_bench(CommandLine& line) {
     return bench_render(render, line);
   }
   if (what == "colour") return bench_colour(line);
+  if (what == "governor") {
+    if (size->count() > 0) governor.size = render.size;
+    if (seconds->count() > 0) governor.seconds = latency.seconds;
+    if (frame_hz->count() > 0) governor.frame_hz = latency.frame_hz;
+    return bench_governor(governor, line);
+  }
   if (what == "latency") {
     if (size->count() > 0) latency.size = render.size;
     return bench_latency(latency, line);
