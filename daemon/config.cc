@@ -3,6 +3,8 @@
 
 #include <cstdlib>
 
+#include "quality/ladder.h"
+
 namespace veneer::daemon {
 namespace {
 
@@ -38,12 +40,30 @@ void read_service(TomlReader toml, service::FrontOptions& service) {
   if (const Status status = service.check(); !status) toml.add_error("bus", status.error().what);
 }
 
+// With a ladder the deadline is what it was measured for.
+void read_quality(TomlReader toml, QualityConfig& quality) {
+  read_path(toml, "ladder", quality.ladder, false);
+  std::string mode(quality::name_of(quality.ladder.empty() ? quality::GovernorMode::kBest
+                                                           : quality::GovernorMode::kDeadline));
+  toml.read("mode", mode);
+  if (const auto parsed = quality::parse_governor_mode(mode)) {
+    quality.mode = *parsed;
+  } else {
+    toml.add_error("mode", parsed.error().what);
+  }
+  toml.read("deadline_ms", quality.deadline_ms);
+  check_range(toml, "deadline_ms", quality.deadline_ms, 0, 1000);
+  toml.read("rung", quality.rung);
+  check_range(toml, "rung", quality.rung, 0, static_cast<double>(quality::Ladder::kMost) - 1);
+}
+
 }  // namespace
 
 Result<Config> Config::read(TomlReader& toml) {
   Config config;
   read_path(toml, "scene", config.scene, true);
-  read_path(toml, "material", config.material, true);
+  read_quality(toml.table("quality"), config.quality);
+  read_path(toml, "material", config.material, config.quality.ladder.empty());
   read_path(toml, "profile", config.profile, true);
   read_path(toml, "summary", config.summary, false);
   read_path(toml, "frame_log", config.frame_log, false);

@@ -8,6 +8,7 @@
 #include "base/result.h"
 #include "base/toml_reader.h"
 #include "projector/control_watch.h"
+#include "quality/governor.h"
 #include "render/renderer.h"
 #include "service/front.h"
 #include "tracking/pose_track.h"
@@ -27,11 +28,21 @@ enum class Latch {
   kEarly,  ///< as soon as the frame before is out
 };
 
+/// What gives way where frames take too long: the table [quality].
+struct QualityConfig {
+  quality::GovernorMode mode = quality::GovernorMode::kBest;
+  /// What `veneer trade` measured; empty: what can be taken off the one material without a fit.
+  std::filesystem::path ladder;
+  /// Of a frame's work, from the pose to the finished picture; 0: most of a frame's period.
+  double deadline_ms = 0;
+  int rung = 0;  ///< in the mode "fixed"
+};
+
 /// veneer.toml. Relative paths refer to the folder of the file. The tables [tracker], [output]
 /// and [control] belong to their drivers.
 struct Config {
   std::filesystem::path scene;
-  std::filesystem::path material;
+  std::filesystem::path material;  ///< may be empty where there is a ladder
   std::filesystem::path profile;
   ClockKind clock = ClockKind::kMonotonic;
   double frame_rate_hz = 60;  ///< 1 to 1000
@@ -49,6 +60,7 @@ struct Config {
   Latch latch = Latch::kLate;
   projector::ControlWatchOptions control;  ///< of the table [control], without its driver's keys
   service::FrontOptions service;
+  QualityConfig quality;
   render::RendererOptions render;
   render::DrawingOptions drawing;  ///< of the material, in [render] too
   tracking::PredictionOptions prediction;

@@ -20,7 +20,8 @@ std::string laws_of(const Config& config) {
   if (!is_within(config.render.geometry_floor, 1e-6, 1)) return "a geometry floor out of range";
   if (!config.drawing.cache.check()) return "a cache that does not pass its check";
   if (!config.prediction.check()) return "a prediction that does not pass its check";
-  if (config.scene.empty() || config.material.empty() || config.profile.empty())
+  if (config.scene.empty() || (config.material.empty() && config.quality.ladder.empty()) ||
+      config.profile.empty())
     return "a required path is missing";
   return "";
 }

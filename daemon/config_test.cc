@@ -46,6 +46,19 @@ TEST(Config, ReadsEveryKey) {
   EXPECT_EQ(config.prediction.horizon_s, 0.1);
 }
 
+TEST(Config, ReadsWhatGivesWay) {
+  Config config;
+  ASSERT_TRUE(read("", &config));
+  EXPECT_EQ(config.quality.mode, quality::GovernorMode::kBest) << "nothing, where nobody says so";
+  ASSERT_TRUE(read("[quality]\nladder = \"l.toml\"\n", &config));
+  EXPECT_EQ(config.quality.mode, quality::GovernorMode::kDeadline);
+  EXPECT_EQ(config.quality.ladder.filename(), "l.toml");
+  ASSERT_TRUE(read("[quality]\nmode = \"fixed\"\nrung = 3\ndeadline_ms = 12.5\n", &config));
+  EXPECT_EQ(config.quality.mode, quality::GovernorMode::kFixed);
+  EXPECT_EQ(config.quality.rung, 3);
+  EXPECT_EQ(config.quality.deadline_ms, 12.5);
+}
+
 TEST(Config, RefusesWhatMakesNoSense) {
   for (const char* line : {"frame_rate_hz = 0",
                            "frame_rate_hz = -3",
@@ -56,6 +69,10 @@ TEST(Config, RefusesWhatMakesNoSense) {
                            "[render]\ngeometry_floor = 0",
                            "[render]\ncache_spacing_px = 2",
                            "[render]\ncompensation = true",
+                           "[quality]\nmode = \"fast\"",
+                           "[quality]\nrung = 8",
+                           "[quality]\nrung = -1",
+                           "[quality]\ndeadline_ms = nan",
                            "[render]\nscale = 0.2",
                            "[render]\nscale = nan",
                            "[render]\nscale = 1.5",

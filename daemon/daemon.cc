@@ -229,6 +229,10 @@ service::ServiceStatus TheDaemon::status() const {
   status.material = names.material;
   status.profile = names.profile;
   status.luminance_ceiling = names.luminance_ceiling;
+  status.quality_rung = static_cast<int>(board_.rung());
+  if (board_.rung() > 0 && board_.rung() < names.rungs.size())
+    status.quality = fmt::format(
+        "{} (rung {} of {})", names.rungs[board_.rung()], board_.rung(), names.rungs.size() - 1);
   status.renderer = stage->loader.renderer_description();
   status.output = stage->output.description();
   if (stage->projector) status.projector = stage->projector->text();
@@ -267,6 +271,7 @@ Status TheDaemon::change(FaultKind about, std::function<Status(Script&)> edit) {
 Status TheDaemon::load_material(const std::filesystem::path& material) {
   return change(FaultKind::kMaterial, [material](Script& script) {
     script.config.material = material;
+    script.config.quality.ladder.clear();  // which was measured for others
     return read_material(script);
   });
 }

@@ -49,6 +49,9 @@ class FigureBoard {
   /// The part of the refreshes within `span` before `now` that had a late frame or none; 0 to 1.
   /// Nothing where no frame was done in that time: one may be under way.
   [[nodiscard]] std::optional<double> late_part(Time now, Duration span) const;
+  /// The rung of the quality on which the last frame was drawn, or which is faded to.
+  void set_rung(std::size_t rung) { rung_.store(rung, std::memory_order_relaxed); }
+  [[nodiscard]] std::size_t rung() const { return rung_.load(std::memory_order_relaxed); }
   /// Since the start.
   [[nodiscard]] std::uint64_t frames() const { return posted_; }
 
@@ -68,6 +71,7 @@ class FigureBoard {
   std::atomic<std::uint64_t> posted_{0};
   std::atomic<std::uint64_t> dropped_{0};
   std::atomic<std::uint64_t> late_{0};
+  std::atomic<std::size_t> rung_{0};
 };
 
 /// The medians, each of its own column, so that their total is near that of a median frame.

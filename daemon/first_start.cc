@@ -32,7 +32,14 @@ Status check_files_are_there(const Config& config) {
                 "say in it which object stands where, who looks and by what light; begin with "
                 "demo/scene.toml of the examples");
   }
-  if (is_missing(config.material)) {
+  if (!config.quality.ladder.empty() && is_missing(config.quality.ladder)) {
+    add_missing(
+        missing,
+        "quality.ladder",
+        config.quality.ladder,
+        "\"veneer trade SET.btfset --scene SCENE.toml --profile FOLDER -o FOLDER\" makes one");
+  }
+  if (config.quality.ladder.empty() && is_missing(config.material)) {
     add_missing(missing,
                 "material",
                 config.material,

@@ -147,7 +147,8 @@ void FrameLoop::notice_tracker() {
 
 void FrameLoop::between_frames() {
   if (show_->profiles && show_->renderer && !show_->lost) show_->profiles->apply(*show_->renderer);
-  parts_.loader.take_next(show_);
+  const std::size_t rung = show_->governor.rung();
+  if (parts_.loader.take_next(show_)) show_->governor.begin_on(rung);
 }
 
 // Whether there is an output, and a show that suits it.
@@ -171,6 +172,13 @@ bool FrameLoop::keep_output() {
   }
   if (!show_->renderer) parts_.loader.want_renderer();
   return true;
+}
+
+// What is left of a period for what follows the drawing, and for waking up late.
+double FrameLoop::deadline_ms() const {
+  constexpr double kOfAPeriod = 0.85;
+  const double asked = show_->script.config.quality.deadline_ms;
+  return asked > 0 ? asked : kOfAPeriod * milliseconds(period_);
 }
 
 void FrameLoop::drop_renderer() {
@@ -225,7 +233,19 @@ FrameLoop::Made FrameLoop::make_frame(const Slot& slot, FrameRecord& record) {
   }
   const SteadyTime begin = std::chrono::steady_clock::now();
   const Duration computed_before = computed();
-  renderer.draw(look(slot, record));
+  quality::Governor& governor = show_->governor;
+  governor.set_deadline(deadline_ms());
+  const std::size_t steps = governor.steps();
+  const quality::Governor::Choice choice = governor.next(parts_.clock.now());
+  run_.quality_steps += governor.steps() - steps;
+  record.rung = governor.rung();
+  record.fade = choice.fade;
+  parts_.board.set_rung(record.rung);
+  render::FrameInput input = look(slot, record);
+  input.level = choice.level;
+  input.next_level = choice.next_level;
+  input.fade = choice.fade;
+  renderer.draw(input);
   frame.number = record.number;
   frame.bits = show_->script.profile.bits;
   frame.display_time = record.display_time;
@@ -243,6 +263,8 @@ FrameLoop::Made FrameLoop::make_frame(const Slot& slot, FrameRecord& record) {
   if (renderer.lost()) return lose_renderer();
   record.statistics = renderer.statistics();
   const double drawn_ms = milliseconds_since(begin);
+  // On a virtual clock a run is the same on any machine, so that what frames take decides nothing.
+  if (is_real_time()) governor.took(choice, drawn_ms);
   const double computed_ms = milliseconds(computed() - computed_before);
   const Made made = made_of(parts_.output.present(frame));
   record.frame_ms = milliseconds_since(begin);

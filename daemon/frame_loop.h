@@ -33,7 +33,9 @@ struct FrameRecord {
   tracking::BodyId observer = 0;  ///< whose picture it is
   tracking::Presence presence = tracking::Presence::kNone;  ///< his
   double specular_weight = 1;                               ///< FrameInput::specular_weight
-  Eigen::Vector3d eye_in_world = Eigen::Vector3d::Zero();   ///< as predicted and shown
+  std::size_t rung = 0;  ///< of the quality, the one that is drawn or faded to
+  double fade = 0;       ///< how far; 0: it is there
+  Eigen::Vector3d eye_in_world = Eigen::Vector3d::Zero();  ///< as predicted and shown
   render::FrameStatistics statistics;
   service::LatencyBudget latency_ms;
 };
@@ -49,6 +51,7 @@ struct RunRecord {
   double seconds = 0;               ///< real time from the first frame to the last handed over
   std::uint64_t held = 0;  ///< frames drawn for a pose that was held, not measured or predicted
   std::uint64_t lost = 0;  ///< of these, frames for an observer who was lost
+  std::uint64_t quality_steps = 0;  ///< from one rung to another
 };
 
 /// A picture that somebody waits for; made by him, filled by the frame loop.
@@ -115,6 +118,7 @@ class FrameLoop {
   [[nodiscard]] static Made made_of(OutputKeeper::Outcome outcome);
   void account(const Slot& slot, Made made, FrameRecord& record);
   void drop_renderer();
+  [[nodiscard]] double deadline_ms() const;
   [[nodiscard]] bool is_real_time() const { return parts_.config.clock == ClockKind::kMonotonic; }
 
   Parts parts_;

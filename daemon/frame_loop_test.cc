@@ -7,6 +7,7 @@
 #include <optional>
 #include <thread>
 
+#include "daemon/summary.h"
 #include "daemon/testing/fakes.h"
 #include "render/internal_testing.h"
 
@@ -55,6 +56,11 @@ class FrameLoopTest : public ::testing::Test {
     script.config = config_;
     script.scene = scene_;
     script.material = std::make_shared<render::ShaderMaterial>("");
+    script.rungs = {{"full", 1, {}, script.material, {}}};
+    // More of them where the fake takes its time.
+    for (std::size_t i = 1; i < hand_.level_ms.size(); ++i)
+      script.rungs.push_back(
+          {"less", hand_.level_ms[i] / hand_.level_ms[0], {}, script.material, {}});
     script.profile.geometry.width = 4;
     script.profile.geometry.height = 3;
     script.profile.bits = 8;
@@ -185,6 +191,43 @@ TEST_F(FrameLoopTest, CountsTheFramesItLosesInRealTime) {
           .value();
   EXPECT_GE(record.dropped, 4U);
   EXPECT_GE(record.late, 1U);
+}
+
+TEST_F(FrameLoopTest, TakesACheaperRungWhereFramesMissTheirDeadline) {
+  config_.clock = ClockKind::kMonotonic;
+  config_.frame_rate_hz = 100;
+  config_.frames = 100;
+  config_.quality.mode = quality::GovernorMode::kDeadline;
+  hand_.level_ms = {30, 20, 1};
+  SteadyClock clock;
+  const RunRecord record = run(clock,
+                               std::make_unique<MovingTracker>(clock, clock.now(), Time::max()),
+                               std::make_unique<FakeOutput>(hand_))
+                               .value();
+  EXPECT_EQ(record.frames.front().rung, 0U);
+  EXPECT_EQ(record.frames.back().rung, 2U) << "the one between would miss it too";
+  EXPECT_GE(record.quality_steps, 1U);
+  EXPECT_EQ(inputs_.back().level, 2U);
+  const Summary summary = summarise(record);
+  ASSERT_EQ(summary.frames_on_rung.size(), 3U);
+  EXPECT_GE(summary.frames_on_rung[2], 70U);
+}
+
+TEST_F(FrameLoopTest, OnAVirtualClockStaysOnTheFirstRung) {
+  config_.quality.mode = quality::GovernorMode::kDeadline;
+  config_.quality.deadline_ms = 0.5;
+  hand_.level_ms = {2, 1};
+  const RunRecord record = run().value();
+  EXPECT_EQ(record.frames.back().rung, 0U);
+  EXPECT_EQ(record.quality_steps, 0U);
+}
+
+TEST_F(FrameLoopTest, InTheModeFixedDrawsTheRungThatIsNamed) {
+  config_.quality.mode = quality::GovernorMode::kFixed;
+  config_.quality.rung = 1;
+  hand_.level_ms = {0, 0, 0};
+  ASSERT_TRUE(run());
+  for (const render::FrameInput& input : inputs_) EXPECT_EQ(input.level, 1U);
 }
 
 }  // namespace

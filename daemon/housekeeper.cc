@@ -64,12 +64,14 @@ void Housekeeper::watch_lateness(Time now) {
   const std::optional<double> part = board_.late_part(now, kLateSpan);
   if (!part) return;
   if (*part > kLateBegins && !faults_.has(FaultKind::kLate)) {
-    faults_.begin(FaultKind::kLate,
-                  now,
-                  fmt::format("{:.0f} % of the frames of the last {} s came late or not at all; "
-                              "choose a smaller picture, a lower rate or a simpler material",
-                              100 * *part,
-                              kLateSpan / 1s));
+    faults_.begin(
+        FaultKind::kLate,
+        now,
+        fmt::format("{:.0f} % of the frames of the last {} s came late or not at all; "
+                    "choose a smaller picture, a lower rate or a simpler material, or let "
+                    "the picture give way: [quality] mode = \"deadline\"",
+                    100 * *part,
+                    kLateSpan / 1s));
   } else if (*part < kLateEnds) {
     faults_.end(FaultKind::kLate, now);
   }

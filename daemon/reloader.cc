@@ -35,9 +35,11 @@ Reloader::Stamps Reloader::stamps_of(const std::filesystem::path& config, const 
        {config,
         script.config.scene,
         script.config.material,
+        script.config.quality.ladder,
         script.config.scene.parent_path() / script.scene.mesh_name}) {
     stamps[file] = identify(file);
   }
+  for (const Script::Rung& rung : script.rungs) stamps[rung.file] = identify(rung.file);
   return stamps;
 }
 
@@ -94,6 +96,8 @@ Status Reloader::read_all() {
   next.config.material = config->material;
   next.config.profile = config->profile;
   next.config.render = config->render;
+  next.config.drawing = config->drawing;
+  next.config.quality = config->quality;
   next.config.presence = config->presence;
   next.config.display_latency_ms = config->display_latency_ms;
   const Stamps stamps = stamps_of(file_.path, named);

@@ -2,9 +2,11 @@
 #include "daemon/show.h"
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "calibration/profile_store.h"
+#include "quality/ladder.h"
 
 namespace veneer::daemon {
 
@@ -16,9 +18,34 @@ Status read_scene(Script& script) {
 }
 
 Status read_material(Script& script) {
-  VENEER_ASSIGN(std::unique_ptr<btf::Material> material,
-                btf::load_material(script.config.material));
-  script.material = std::move(material);
+  const Config& config = script.config;
+  // Rungs may share a material; each is read once.
+  std::map<std::filesystem::path, std::shared_ptr<const btf::Material>> materials;
+  quality::Ladder ladder;
+  if (config.quality.ladder.empty()) {
+    VENEER_ASSIGN(std::shared_ptr<const btf::Material> material,
+                  btf::load_material(config.material));
+    ladder =
+        quality::ladder_of(config.material, material->shader().cache.has_value(), config.drawing);
+    // What is never drawn takes no memory of the GPU.
+    if (config.quality.mode == quality::GovernorMode::kBest) ladder.rungs.resize(1);
+    materials[config.material] = std::move(material);
+  } else {
+    VENEER_ASSIGN(ladder, quality::Ladder::load(config.quality.ladder));
+  }
+  std::vector<Script::Rung> rungs;
+  for (const quality::Rung& rung : ladder.rungs) {
+    std::shared_ptr<const btf::Material>& material = materials[rung.material];
+    if (material == nullptr) {
+      auto loaded = btf::load_material(rung.material);
+      if (!loaded)
+        return fail_while(fmt::format("reading the ladder's rung {}", rung.name), loaded.error());
+      material = *std::move(loaded);
+    }
+    rungs.push_back({rung.name, rung.ratio, rung.material, material, rung.drawing});
+  }
+  script.material = rungs.front().material;
+  script.rungs = std::move(rungs);
   return {};
 }
 
@@ -45,11 +72,25 @@ tl::expected<Script, Refusal> read_script(const Config& config, std::string* war
   return script;
 }
 
+namespace {
+
+quality::Governor governor_of(const Script& script) {
+  quality::GovernorOptions options;
+  options.mode = script.config.quality.mode;
+  options.fixed_rung = static_cast<std::size_t>(script.config.quality.rung);
+  std::vector<double> ratios;
+  for (const Script::Rung& rung : script.rungs) ratios.push_back(rung.ratio);
+  return {options, std::move(ratios)};
+}
+
+}  // namespace
+
 Show::Show(Script made_of, const PoseFeed& poses, std::unique_ptr<render::Renderer> made)
     : script(std::move(made_of)),
       renderer(std::move(made)),
       observers(poses, script.scene.observer_bodies, script.config.presence),
       object(script.config.presence),
+      governor(governor_of(script)),
       codes(script.raster().width, script.raster().height),
       target(script.raster().width, script.raster().height) {}
 

@@ -19,6 +19,7 @@
 #include "daemon/observers.h"
 #include "daemon/pose_feed.h"
 #include "daemon/profile_watcher.h"
+#include "quality/governor.h"
 #include "render/prepared_profile.h"
 #include "render/renderer.h"
 #include "render/scene.h"
@@ -34,6 +35,16 @@ struct Script {
   render::Scene scene;
   /// Shared by the scripts that have it in common: it may be as large as half the memory.
   std::shared_ptr<const btf::Material> material;
+  /// The ways in which it is drawn, best first, at least one: those of the ladder, which has
+  /// materials of its own, or what can be taken off the one material.
+  struct Rung {
+    std::string name;
+    double ratio = 1;  ///< of costs
+    std::filesystem::path file;
+    std::shared_ptr<const btf::Material> material;
+    render::DrawingOptions drawing;
+  };
+  std::vector<Rung> rungs;
   calibration::ProjectorProfile profile;
   std::optional<FileIdentity> profile_identity;  ///< before it was read
 
@@ -76,6 +87,7 @@ struct Show {
   std::string description;                                    ///< the renderer's
   Observers observers;
   tracking::PresenceFilter object;
+  quality::Governor governor;
   Image<Rgb16> codes;
   Image<Rgb32f> target;
   std::unique_ptr<ProfileWatcher> profiles;  ///< null where the profile stays

@@ -4,7 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
 namespace veneer::daemon {
@@ -145,7 +144,9 @@ Result<std::unique_ptr<Show>> ShowLoader::make(Script script) {
       use.reset(&scanout_users_);
     }
   }
-  const std::array levels{render::Level{script.material.get(), script.config.drawing}};
+  std::vector<render::Level> levels;
+  for (const Script::Rung& rung : script.rungs)
+    levels.push_back({rung.material.get(), rung.drawing});
   auto renderer =
       devices_.make_renderer(script.scene, levels, script.profile, script.config.render, scanout);
   if (!renderer && scanout != nullptr && renderer.error().code == Errc::kUnavailable) {
@@ -313,9 +314,14 @@ void ShowLoader::describe(const Show& show) {
   const std::scoped_lock lock(about_mutex_);
   renderer_description_ = show.description;
   names_ = {config.scene.string(),
-            fmt::format("{} ({})", config.material.string(), show.script.material->model()),
+            fmt::format(
+                "{} ({})",
+                (config.quality.ladder.empty() ? config.material : config.quality.ladder).string(),
+                show.script.material->model()),
             config.profile.string(),
-            config.render.luminance_ceiling};
+            config.render.luminance_ceiling,
+            {}};
+  for (const Script::Rung& rung : show.script.rungs) names_.rungs.push_back(rung.name);
 }
 
 ProfileCounts ShowLoader::profile_counts() const {

@@ -89,6 +89,7 @@ class ShowLoader {
     std::string material;
     std::string profile;
     double luminance_ceiling = 0;
+    std::vector<std::string> rungs;  ///< of the quality, best first
   };
   [[nodiscard]] Names names() const;
 

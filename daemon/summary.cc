@@ -62,6 +62,8 @@ Summary summarise(const RunRecord& run) {
   for (const FrameRecord& frame : run.frames) {
     frame_ms.push_back(frame.frame_ms);
     budgets.push_back(frame.latency_ms);
+    if (frame.rung >= summary.frames_on_rung.size()) summary.frames_on_rung.resize(frame.rung + 1);
+    ++summary.frames_on_rung[frame.rung];
     pose_age_ms.push_back(frame.pose_age_ms);
     const auto pixels = static_cast<double>(frame.statistics.covered_pixels);
     covered += pixels;
@@ -85,6 +87,7 @@ Summary summarise(const RunRecord& run) {
   summary.late = run.late;
   summary.held = run.held;
   summary.lost = run.lost;
+  summary.quality_steps = run.quality_steps;
   return summary;
 }
 
@@ -114,6 +117,8 @@ Status write_summary(const Summary& summary, const std::filesystem::path& path) 
       {"pose_age_ms_p99", summary.pose_age_ms_p99},
       {"dropped_frames", summary.dropped},
       {"late_frames", summary.late},
+      {"quality_steps", summary.quality_steps},
+      {"frames_on_rung", summary.frames_on_rung},
       {"held_frames", summary.held},
       {"lost_frames", summary.lost},
       {"rejected_poses", summary.rejected_poses},
@@ -144,12 +149,13 @@ Status write_frame_log(const RunRecord& run, const std::filesystem::path& path) 
   std::string text =
       "frame,display_time_ns,frame_ms,gpu_ms,pose_age_ms,eye_x,eye_y,eye_z,covered,out_of_gamut,"
       "observer,"
-      "presence,specular_weight,tracker_ms,hand_off_ms,wait_ms,draw_ms,gpu_draw_ms,compensate_ms,"
+      "presence,specular_weight,rung,fade,tracker_ms,hand_off_ms,wait_ms,draw_ms,gpu_draw_ms,"
+      "compensate_ms,"
       "present_ms,display_ms\n";
   for (const FrameRecord& frame : run.frames) {
     const std::optional<double>& gpu_ms = frame.statistics.gpu_ms;
     text += fmt::format(
-        "{},{},{:.4f},{},{:.4f},{:.6f},{:.6f},{:.6f},{},{},{},{},{:.4f},"
+        "{},{},{:.4f},{},{:.4f},{:.6f},{:.6f},{:.6f},{},{},{},{},{:.4f},{},{:.4f},"
         "{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f}\n",
         frame.number,
         frame.display_time.time_since_epoch().count(),
@@ -164,6 +170,8 @@ Status write_frame_log(const RunRecord& run, const std::filesystem::path& path) 
         frame.observer,
         name_of(frame.presence),
         frame.specular_weight,
+        frame.rung,
+        frame.fade,
         frame.latency_ms.tracker,
         frame.latency_ms.hand_off,
         frame.latency_ms.wait,

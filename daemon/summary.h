@@ -20,8 +20,11 @@ struct Summary {
   double pose_age_ms_p99 = 0;
   std::uint64_t dropped = 0;
   std::uint64_t late = 0;
-  std::uint64_t held = 0;  ///< frames drawn for a pose that was only held
-  std::uint64_t lost = 0;  ///< of these, frames for an observer who was lost
+  std::uint64_t held = 0;           ///< frames drawn for a pose that was only held
+  std::uint64_t lost = 0;           ///< of these, frames for an observer who was lost
+  std::uint64_t quality_steps = 0;  ///< from one rung to another
+  std::vector<std::uint64_t>
+      frames_on_rung;  ///< remembered ones, by rung; fades count for where they lead
   std::uint64_t rejected_poses = 0;
   bool tracker_lost = false;
   tracking::TrackerCounters tracker_counters;
@@ -48,7 +51,7 @@ struct Summary {
 /// Written whole or not at all.
 [[nodiscard]] Status write_summary(const Summary& summary, const std::filesystem::path& path);
 /// CSV: frame, display_time_ns, frame_ms, gpu_ms, pose_age_ms, eye x, y, z, pixels covered and out
-/// of gamut, observer (a body), his presence, specular_weight, and the parts
+/// of gamut, observer (a body), his presence, specular_weight, rung and fade, and the parts
 /// of the latency in milliseconds (service::LatencyBudget).
 [[nodiscard]] Status write_frame_log(const RunRecord& run, const std::filesystem::path& path);
 

@@ -58,6 +58,16 @@ Governor::Governor(const GovernorOptions& options, std::vector<double> ratios)
   from_ = rung_;
 }
 
+void Governor::set_deadline(double ms) {
+  VENEER_CHECK(ms > 0.0);
+  options_.deadline_ms = ms;
+}
+
+void Governor::begin_on(std::size_t rung) {
+  if (options_.mode != GovernorMode::kDeadline) return;
+  rung_ = from_ = std::min(rung, ratio_.size() - 1);
+}
+
 Governor::Choice Governor::next(Time now) {
   if (last_ && (now < *last_ || now - *last_ > kPause)) {
     // The machine slept, or the clock was set: nothing is known of the load any more.

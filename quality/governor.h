@@ -24,7 +24,7 @@ enum class GovernorMode {
 struct GovernorOptions {
   GovernorMode mode = GovernorMode::kBest;
   std::size_t fixed_rung = 0;
-  double deadline_ms = 16;  ///< of a frame's work; > 0 (checked)
+  double deadline_ms = 15;  ///< of a frame's work; > 0 (checked)
   /// Up only where the better rung is expected to take less than this part of the deadline.
   double room_up = 0.85;
   Duration least_between_steps = std::chrono::seconds(1);
@@ -60,6 +60,10 @@ class Governor {
   /// The rung that is drawn, or faded to.
   [[nodiscard]] std::size_t rung() const { return rung_; }
   [[nodiscard]] std::size_t rung_count() const { return ratio_.size(); }
+  /// Of a frame's work, from now on; > 0 (checked).
+  void set_deadline(double ms);
+  /// Goes on where another one was, whose ladder this was too or had as many rungs.
+  void begin_on(std::size_t rung);
   /// Steps so far.
   [[nodiscard]] std::size_t steps() const { return steps_; }
   /// Whether frames miss the deadline, and nothing cheaper is left.

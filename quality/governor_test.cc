@@ -235,6 +235,24 @@ TEST(Governor, StaysWhereItIsToldTo) {
   EXPECT_EQ(best.rung(), 0U);
 }
 
+TEST(Governor, GoesOnWhereAnotherWas) {
+  Governor governor(with_deadline(), kCosts);
+  governor.begin_on(2);
+  EXPECT_EQ(governor.next(Time{}), (Governor::Choice{2, 2, 0}));
+  governor.begin_on(7);
+  EXPECT_EQ(governor.rung(), 3U);
+  GovernorOptions options = with_deadline();
+  options.mode = GovernorMode::kBest;
+  Governor best(options, kCosts);
+  best.begin_on(2);
+  EXPECT_EQ(best.rung(), 0U) << "it is told to stay there";
+  // Under a shorter deadline it finds another rung.
+  Governor hurried(with_deadline(), kCosts);
+  hurried.set_deadline(4);
+  static_cast<void>(drive(hurried, {kCosts, [](double) { return 1.0; }}, 20, 1));
+  EXPECT_EQ(hurried.rung(), 3U);
+}
+
 TEST(Governor, MakesNothingOfFramesThatNobodyTimed) {
   Governor governor(with_deadline(), kCosts);
   const double nonsense[] = {kNaN, -1.0, std::numeric_limits<double>::infinity()};

@@ -112,6 +112,7 @@ struct ServiceStatus {
   LatencyBudget latency_ms;
   /// Of what the picture is made now: "full", or what was taken off to hold the frame rate.
   std::string quality = "full";
+  int quality_rung = 0;          ///< 0: "full"
   double luminance_ceiling = 0;  ///< cd/m^2; 0: none
 };
 

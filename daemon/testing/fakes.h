@@ -37,6 +37,7 @@ struct Stagehand {
   std::atomic<int> alive{0};     ///< renderers that were not destroyed
   std::atomic<bool> dark{true};  ///< as the audience sees it
   std::atomic<int> ceiling{0};   ///< of the renderer whose frame was presented last
+  std::vector<double> level_ms;  ///< what a frame takes on each level; nothing where empty
 };
 
 /// A body that moves along x at 1 m/s and is measured every 4 ms; gone after `end`.
@@ -97,7 +98,13 @@ class FakeRenderer final : public render::Renderer {
     codes(0, 0) = {7, 8, static_cast<std::uint16_t>(9 + mark_)};
   }
   void read_target(ImageView<Rgb32f>) override {}
-  void finish() override {}
+  void finish() override {
+    if (hand_.level_ms.empty() || inputs.empty()) return;
+    const render::FrameInput& input = inputs.back();
+    const double ms = hand_.level_ms.at(input.level) * (1 - input.fade) +
+                      hand_.level_ms.at(input.next_level) * input.fade;
+    std::this_thread::sleep_for(std::chrono::duration<double, std::milli>(ms));
+  }
   render::FrameStatistics statistics() override {
     render::FrameStatistics statistics;
     statistics.gpu_ms = 0.5;

@@ -101,6 +101,9 @@ std::vector<MetricFamily> families_of(const ServiceStatus& status) {
   families.push_back(one_gauge("veneer_luminance_ceiling_candelas_per_square_metre",
                                "No brighter than this is shown; 0 for no ceiling",
                                status.luminance_ceiling));
+  families.push_back(one_gauge("veneer_quality_rung",
+                               "How far down the ladder the picture is drawn; 0 is the best",
+                               status.quality_rung));
   families.push_back(one_counter(
       "veneer_frames_total", "Frames handed to the output since the start", status.frames));
   families.push_back(one_counter(
