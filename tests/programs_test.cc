@@ -273,6 +273,13 @@ TEST_F(ProgramsTest, CompareGivesThePublishedTablesOfASet) {
       run("veneer compare " + text("cloth.btfset") + " --models granite"), 2, "there is no model"));
 }
 
+TEST_F(ProgramsTest, AGovernorIsNotTimedWhereNothingCanBeSeen) {
+  EXPECT_TRUE(fails(run("veneer bench governor --size 8x8"), 2, "--size 8x8"));
+  EXPECT_TRUE(fails(run("veneer bench governor --size 128"), 2, "WIDTHxHEIGHT"));
+  EXPECT_TRUE(fails(run("veneer bench governor --seconds 5"), 2, "--seconds 5"));
+  EXPECT_TRUE(fails(run("veneer bench governor --busy -1"), 2, "--busy"));
+}
+
 TEST_F(ProgramsTest, TheDaemonMakesTheSameFramesTwice) {
   for (const char* name : {"first", "second"}) {
     const Outcome outcome =

@@ -34,8 +34,8 @@ Result<int> run_bench(CommandLine& line) {
                  "compares what is drawn with a given one");
   CLI::Option* size = app.add_option("--size",
                                      render.size,
-                                     "render: pixels, WIDTHxHEIGHT; latency and governor: "
-                                     "likewise, 320x240 by itself");
+                                     "render: pixels, WIDTHxHEIGHT; latency: "
+                                     "likewise, 320x240 by itself; governor: 128x96");
   size->capture_default_str();
   app.add_option("--frames", render.frames, "render: draws of each")->capture_default_str();
   app.add_option("--material",
@@ -82,7 +82,7 @@ Result<int> run_bench(CommandLine& line) {
   CLI::Option* frame_hz =
       app.add_option("--frame-hz",
                      latency.frame_hz,
-                     "latency: frames a second; governor: likewise, 30 by itself")
+                     "latency: frames a second; governor: likewise, 20 by itself")
           ->capture_default_str()
           ->check(CLI::Range(1.0, 1000.0));
   app.add_option("--busy",
