@@ -21,9 +21,10 @@ endfunction()
 
 if(VENEER_PRECOMPILE)
   # Some libraries ask for it, and all who share must agree.
+  target_compile_options(veneer_options INTERFACE -pthread)
   # g++ 12 forgets there which headers are the system's, and warns of what it inlines from them.
-  target_compile_options(veneer_options INTERFACE -pthread -Wno-stringop-overflow -Wno-array-bounds
-                                                  -Wno-stringop-overread)
+  # Warnings are errors wherever nothing is precompiled.
+  set(CMAKE_COMPILE_WARNING_AS_ERROR OFF)
   veneer_add_precompiled(veneer_precompiled "${veneer_common_headers}" Eigen3::Eigen fmt::fmt)
   if(VENEER_TESTS)
     veneer_add_precompiled(veneer_precompiled_tests

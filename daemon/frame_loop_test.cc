@@ -225,7 +225,7 @@ TEST_F(FrameLoopTest, OnAVirtualClockStaysOnTheFirstRung) {
 TEST_F(FrameLoopTest, InTheModeFixedDrawsTheRungThatIsNamed) {
   config_.quality.mode = quality::GovernorMode::kFixed;
   config_.quality.rung = 1;
-  hand_.level_ms = {0, 0, 0};
+  hand_.level_ms = {0.01, 0.01, 0.01};
   ASSERT_TRUE(run());
   for (const render::FrameInput& input : inputs_) EXPECT_EQ(input.level, 1U);
 }

@@ -15,9 +15,11 @@ constexpr double kNear = 0.97;       // of the deadline: so near that frames wil
 constexpr double kRoomDown = 0.92;   // a rung below is wanted to keep to this part
 constexpr double kMost = 0.90;   // the quantile that may not come near; single hiccups are beyond
 constexpr double kUpper = 0.95;  // the quantile that must have room on a better rung
+constexpr double kOften = 0.02;  // of the history: twice as many as may miss
+constexpr std::size_t kFewest = 5;       // misses, to say that they are often
 constexpr Duration kLeastPatience = 2s;  // of room, before a step up
 constexpr Duration kMostPatience = 120s;
-constexpr Duration kSoon = 10s;     // a rung left within this time was a mistake
+constexpr Duration kSoon = 30s;     // a rung left within this time was a mistake
 constexpr Duration kSettled = 60s;  // one that was kept so long was none
 constexpr Duration kPause = 2s;     // between frames: what was learned of the load is old
 constexpr double kLearning = 0.7;   // of what a step says about the ratio of two rungs
@@ -88,7 +90,7 @@ Governor::Choice Governor::next(Time now) {
 void Governor::took(const Choice& choice, double ms) {
   if (!std::isfinite(ms) || ms < 0.0) return;
   if (choice.level != choice.next_level || choice.level != rung_) return;
-  window_[seen_ % kWindow] = ms;
+  history_[seen_ % kHistory] = ms;
   ++seen_;
   if (seen_ == kEnough) learn();
 }
@@ -98,7 +100,8 @@ void Governor::forget_room() { std::ranges::fill(room_since_, std::nullopt); }
 std::optional<double> Governor::quantile(double part) const {
   const std::size_t count = std::min(seen_, kWindow);
   if (count < kEnough) return std::nullopt;
-  std::array<double, kWindow> sorted = window_;
+  std::array<double, kWindow> sorted{};
+  for (std::size_t i = 0; i < count; ++i) sorted[i] = last(i);
   const auto begin = sorted.begin();
   const auto nth = begin + static_cast<std::ptrdiff_t>(part * static_cast<double>(count - 1) + 0.5);
   std::nth_element(begin, nth, begin + static_cast<std::ptrdiff_t>(count));
@@ -108,13 +111,20 @@ std::optional<double> Governor::quantile(double part) const {
 bool Governor::misses() const {
   if (seen_ < kRecent) return false;
   std::size_t missed = 0;
-  for (std::size_t i = seen_ - kRecent; i < seen_; ++i)
-    missed += window_[i % kWindow] > options_.deadline_ms ? 1 : 0;
+  for (std::size_t i = 0; i < kRecent; ++i) missed += last(i) > options_.deadline_ms ? 1 : 0;
   return 2 * missed >= kRecent;
 }
 
 bool Governor::comes_near() const {
+  // Of few frames, a tenth is chance.
   return seen_ >= kWindow && *quantile(kMost) > kNear * options_.deadline_ms;
+}
+
+bool Governor::misses_often() const {
+  const std::size_t count = std::min(seen_, kHistory);
+  std::size_t missed = 0;
+  for (std::size_t i = 0; i < count; ++i) missed += last(i) > options_.deadline_ms ? 1 : 0;
+  return missed >= kFewest && static_cast<double>(missed) > kOften * static_cast<double>(count);
 }
 
 bool Governor::is_overloaded() const {
@@ -167,7 +177,7 @@ void Governor::consider(Time now) {
     patience_[rung_] = kLeastPatience;
     tried_.reset();
   }
-  if (misses() || comes_near()) {
+  if (misses() || comes_near() || misses_often()) {
     forget_room();
     if (!may_step || rung_ + 1 == ratio_.size()) return;
     if (tried_ && *tried_ == rung_ && now - *stepped_ < kSoon)
@@ -175,7 +185,7 @@ void Governor::consider(Time now) {
     tried_.reset();
     // What frames take now: with few on this rung, or since the load came, the last ones.
     std::array<double, kRecent> recent{};
-    for (std::size_t i = 0; i < kRecent; ++i) recent[i] = window_[(seen_ - 1 - i) % kWindow];
+    for (std::size_t i = 0; i < kRecent; ++i) recent[i] = last(i);
     std::ranges::sort(recent);
     step(rung_below(recent[kRecent / 2]), now);
     return;

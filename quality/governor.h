@@ -37,10 +37,10 @@ struct GovernorOptions {
 /// What a rung would cost under the load of the moment is what the present one costs, times the
 /// ratio of the two; the ratios are those that were measured at first, and are put right with every
 /// step, from what frames took before and after it. A rung is left downwards once half of the last
-/// frames missed the deadline, or a tenth of the last fifty came near it; upwards only when
-/// the better one has been expected to keep well inside for a while. That while doubles whenever a
-/// rung had to be left again soon, so that a load that comes and goes does not make the picture do
-/// so.
+/// frames missed the deadline, or a tenth of the last fifty came near it, or a fiftieth of the last
+/// four hundred missed it; upwards only when the better one has been expected to keep well inside
+/// for a while. That while doubles whenever a rung had to be left again soon, so that a load that
+/// comes and goes does not make the picture do so.
 class Governor {
  public:
   /// @param ratios  of the rungs' costs, best first: Rung::ratio. At least one, all > 0 (checked).
@@ -71,11 +71,15 @@ class Governor {
 
  private:
   static constexpr std::size_t kWindow = 50;  // frames
+  static constexpr std::size_t kHistory = 400;
   static constexpr std::size_t kRecent = 6;
+  // The n-th last frame on this rung, from 0.
+  [[nodiscard]] double last(std::size_t n) const { return history_[(seen_ - 1 - n) % kHistory]; }
   /// Of the last frames on this rung; nothing before there are enough.
   [[nodiscard]] std::optional<double> quantile(double part) const;
-  [[nodiscard]] bool misses() const;      // half of the last few frames
-  [[nodiscard]] bool comes_near() const;  // a tenth of the window
+  [[nodiscard]] bool misses() const;        // half of the last few frames
+  [[nodiscard]] bool comes_near() const;    // a tenth of the window
+  [[nodiscard]] bool misses_often() const;  // a fiftieth of the history
   [[nodiscard]] double expected(std::size_t rung, double ms_here) const;
   void forget_room();
   void learn();
@@ -91,7 +95,7 @@ class Governor {
   int fade_left_ = 0;
   std::optional<double> before_;  // what frames took on from_
   // Of frames on rung_, a ring.
-  std::array<double, kWindow> window_{};
+  std::array<double, kHistory> history_{};
   std::size_t seen_ = 0;
   std::optional<Time> last_;
   std::optional<Time> stepped_;

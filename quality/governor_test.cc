@@ -183,7 +183,7 @@ TEST(Governor, LearnsRatiosThatWereMeasuredElsewhere) {
 TEST(Governor, OneLateFrameIsNoReason) {
   Governor governor(with_deadline(), kCosts);
   Machine machine{kCosts, [](double) { return 0.6; }};
-  machine.hiccups = 0.01;
+  machine.hiccups = 0.005;
   const Drive run = drive(governor, machine, 120, 11);
   EXPECT_TRUE(run.steps.empty());
 }
