@@ -157,8 +157,20 @@ TEST_F(Evaluate, SaysWhereMaterialAndSetDoNotFit) {
     EXPECT_NE(result.error().what.find(says), std::string::npos) << result.error().what;
   };
   refused([](SampleSetInfo& i) { i.width = 4; }, "4 x 3 texels");
-  refused([](SampleSetInfo& i) { i.views.pop_back(); }, "other directions");
-  refused([](SampleSetInfo& i) { std::swap(i.lights[0], i.lights[1]); }, "other directions");
+  refused([](SampleSetInfo& i) { i.views.back() = -i.views.back(); }, "other directions");
+  refused([](SampleSetInfo& i) { i.lights[0] = Direction(0.6, 0, 0.8); }, "other directions");
+}
+
+TEST_F(Evaluate, AMaterialOfAPartOfTheDirectionsIsComparedThere) {
+  SilentProgress progress;
+  SampleSetInfo info = small_info();
+  info.views.pop_back();
+  info.lights.pop_back();
+  const auto result = evaluate(
+      set_, FakeMaterial(info, [](int, int, int l) { return l == 1 ? 0.1F : 0.0F; }), progress);
+  ASSERT_TRUE(result) << result.error().what;
+  EXPECT_NEAR(result->linear.epsilon_avg, 0.1 / 2.0, kFloat);
+  EXPECT_NEAR(result->linear.epsilon_max, 0.1, kFloat);
 }
 
 TEST_F(Evaluate, NonFiniteValuesAreErrors) {
