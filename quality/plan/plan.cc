@@ -12,11 +12,15 @@
 namespace veneer::quality {
 namespace {
 
-// What a general fit has; a planned one begins with as fine a grid over its box.
+// What a general fit has.
 constexpr int kGeneralNodes = 16;
 constexpr int kGeneralClusters = 32;
-constexpr int kMostClusters = 256;
-constexpr std::array kNodes{16, 12, 10, 8, 6, 5, 4};
+// A planned one begins with the finest grid and the most clusters whose volume is no larger: both
+// cost bytes, of which a small box hardly needs any, and no fetches. Nodes are counted along the
+// whole square; a fit crops them to its box.
+constexpr std::array kNodes{32, 24, 16, 12, 8, 6, 4};
+constexpr int kMoreClusters = 4;
+constexpr int kTexelsOfCluster = 16;  // fewer keep next to a component each
 
 // Of models of one term, and of two: every further entry costs fetches. Scalars are packed four to
 // a volume, so there is nothing between.
@@ -32,12 +36,28 @@ bool is_one_place(const btf::DirectionBox& box) {
   return box.u_max - box.u_min < kWidth && box.v_max - box.v_min < kWidth;
 }
 
-int nodes_for(const btf::FitRegion& region) {
-  double widest = 0;
+double nodes_in(const btf::FitRegion& region, int angular) {
+  double count = 1;
   for (const btf::DirectionBox* box : {&region.views, &region.lights})
-    widest = std::max({widest, box->u_max - box->u_min, box->v_max - box->v_min});
-  const int nodes = 1 + static_cast<int>(std::ceil((kGeneralNodes - 1) * widest));
-  return std::clamp(nodes, btf::FitOptions::kLeastAngular, kGeneralNodes);
+    for (const double side : {box->u_max - box->u_min, box->v_max - box->v_min})
+      count *= std::max(2.0, std::ceil(angular * side));
+  return count;
+}
+
+// What a fit to the region begins with.
+btf::FitOptions finest_for(const btf::FitRegion& region, int texels) {
+  const double most = std::pow(kGeneralNodes, 4);
+  btf::FitOptions options;
+  options.angular = kGeneralNodes;
+  for (const int nodes : kNodes)
+    if (nodes >= kGeneralNodes && nodes_in(region, nodes) <= most) {
+      options.angular = nodes;
+      break;
+    }
+  const int room = static_cast<int>(most / nodes_in(region, options.angular));
+  const int more = std::clamp(texels / (kTexelsOfCluster * kGeneralClusters), 1, kMoreClusters);
+  options.clusters = std::min(texels, kGeneralClusters * std::clamp(room, 1, more));
+  return options;
 }
 
 std::span<const char* const> ladder_of(int terms, bool second_dropped) {
@@ -111,8 +131,11 @@ Result<PlannedFit> Planner::fit(const std::string& model,
   fitted.for_region = for_region;
   btf::FitOptions own = options;
   own.region = for_region ? &plan_.reach.region : nullptr;
+  // A line for each fit, not for each of its stages.
+  progress_.start(for_region ? fitted.name() : fitted.name() + ", for any scene", 1);
+  SilentProgress silent;
   const auto begin = std::chrono::steady_clock::now();
-  VENEER_ASSIGN(fitted.material, found->fit(set_, own, progress_));
+  VENEER_ASSIGN(fitted.material, found->fit(set_, own, silent));
   fitted.fit_seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   const btf::ModelShader shader = fitted.material->shader();
@@ -120,6 +143,12 @@ Result<PlannedFit> Planner::fit(const std::string& model,
   fitted.bytes = static_cast<double>(shader.gpu_bytes());
   fitted.difference = from_full_.of(drawn_by(*fitted.material));
   VENEER_ASSIGN(fitted.set_rmse, weighted_rmse(set_, *fitted.material, plan_.reach.region.weights));
+  progress_.advance();
+  progress_.finish(fmt::format("mean {:.2f} dE00, {} fetches, {:.3f} MB: its error is {}",
+                               fitted.difference.de00_mean,
+                               fitted.fetches,
+                               fitted.bytes / 1e6,
+                               is_invisible(fitted.difference) ? "not seen" : "seen"));
   return fitted;
 }
 
@@ -196,10 +225,8 @@ Status Planner::try_model(const std::string& name) {
                 "planning: {} needs a set that knows specular and diffuse apart, which {} does not",
                 name,
                 set_.path().string());
-  btf::FitOptions options;
+  btf::FitOptions options = finest_for(plan_.reach.region, set_.info().texel_count());
   options.seed = options_.seed;
-  options.clusters = std::min(kGeneralClusters, set_.info().texel_count());
-  options.angular = nodes_for(plan_.reach.region);
   if (model->terms == 0) {
     VENEER_ASSIGN(const PlannedFit fitted, tried(name, options));
     return {};
@@ -218,14 +245,6 @@ Status Planner::try_model(const std::string& name) {
     VENEER_TRY(fitted);
     if (is_invisible(fitted->difference)) {
       PlannedFit best = *fitted;
-      if (i > 0 && model->over_ranks) {
-        btf::FitOptions finer = options;
-        finer.components = ladder[i - 1];
-        finer.clusters = std::min({4 * options.clusters, kMostClusters, set_.info().texel_count()});
-        if (const auto other = tried(name, finer);
-            other && is_invisible(other->difference) && costs_less(*other, best))
-          best = *other;
-      }
       if (model->terms == 2 && !second_dropped) {
         btf::FitOptions one = best.options;
         one.components = kFirstTerm[static_cast<std::size_t>(
@@ -298,14 +317,26 @@ Status Planner::compare_with_general() {
   plan_.general_alike = plan_.general;
   if (model->terms == 0) return {};
   const auto ladder = ladder_of(model->terms, chosen.options.components.ends_with("+0"));
-  const auto at = std::ranges::find(ladder, std::string_view(chosen.options.components));
-  for (auto next = at; next != ladder.end(); ++next) {
-    if (plan_.general_alike->difference.rmse <= chosen.difference.rmse) break;
-    if (next == at) continue;
-    options.components = *next;
+  if (plan_.general_alike->difference.rmse <= chosen.difference.rmse) return {};
+  // The fewest that do: more components leave less, so halving finds them.
+  auto first = std::ranges::find(ladder, std::string_view(chosen.options.components)) + 1;
+  auto last = ladder.end();
+  while (first < last) {
+    const auto middle = first + (last - first) / 2;
+    options.components = *middle;
     auto fitted = fit(chosen.model, options, false);
-    if (!fitted) break;  // larger than GPUs take: what there is stands
-    plan_.general_alike = *fitted;
+    if (!fitted) {  // larger than GPUs take
+      last = middle;
+      continue;
+    }
+    const bool is_alike = fitted->difference.rmse <= chosen.difference.rmse;
+    if (is_alike || plan_.general_alike->difference.rmse > fitted->difference.rmse)
+      plan_.general_alike = *fitted;
+    if (is_alike) {
+      last = middle;
+    } else {
+      first = middle + 1;
+    }
   }
   return {};
 }

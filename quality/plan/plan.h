@@ -84,12 +84,12 @@ using TimeMaterial = std::function<Result<double>(const btf::Material&)>;
 ///
 /// For each model, components are added until the error is invisible on this projector (mean dE00
 /// at most max_de00, or under one code value) and no further. Before that, the second term of a
-/// model is dropped where leaving it out is never seen (VisibleDifference::is_never_seen). Then
-/// four times the clusters are tried with the components of a step before, which cost no fetches,
-/// and nodes and clusters are taken away as long as the error stays invisible. Of the models
-/// whose error is invisible the one of fewest fetches is chosen, of equal ones that of fewest
-/// bytes; where there is none, that of least mean error. If a frame may not take as long as that,
-/// the next best of all that was tried which may.
+/// model is dropped where leaving it out is never seen (VisibleDifference::is_never_seen). Grids
+/// are as fine and clusters as many as a small region has room for in the bytes of a general fit,
+/// since neither costs fetches; once the components suffice, both are taken away as long as the
+/// error stays invisible. Of the models whose error is invisible the one of fewest fetches is
+/// chosen, of equal ones that of fewest bytes; where there is none, that of least mean error. If a
+/// frame may not take as long as that, the next best of all that was tried which may.
 ///
 /// Deterministic but for timing. Errors: those of find_reach(), of the profile, of the fits;
 /// kInvalidOption (no model can be fitted to this set).

@@ -141,19 +141,22 @@ TEST_F(Planned, KeepsToTheTimeOfAFrame) {
   options.compare_general = false;
   options.models = {"revised-lpca"};
   options.max_de00 = 0.05;
+  // Under enough light for one component's error to be more than a code value.
+  render::Scene bright = plate(-30, 30, 1);
+  bright.lights = {render::DirectionalLight{testing::place(0, 45), {2000, 2000, 2000}}};
   // A machine on which a fetch takes a millisecond.
   const TimeMaterial clock = [](const btf::Material& material) -> Result<double> {
     return material.shader().fetches;
   };
-  const auto free = plan(set, plate(-30, 30, 1), options, clock);
+  const auto free = plan(set, bright, options, clock);
   ASSERT_TRUE(free) << free.error().what;
   options.frame_ms = free->chosen.fetches - 1;
-  const auto bound = plan(set, plate(-30, 30, 1), options, clock);
+  const auto bound = plan(set, bright, options, clock);
   ASSERT_TRUE(bound) << bound.error().what;
   EXPECT_LE(*bound->chosen.frame_ms, *options.frame_ms);
   EXPECT_GE(bound->chosen.difference.de00_mean, free->chosen.difference.de00_mean);
   options.frame_ms = 0.01;
-  const auto hopeless = plan(set, plate(-30, 30, 1), options, clock);
+  const auto hopeless = plan(set, bright, options, clock);
   ASSERT_TRUE(hopeless) << hopeless.error().what;
   EXPECT_NE(plan_text(*hopeless).find("fast enough"), std::string::npos);
 }

@@ -78,7 +78,6 @@ TEST_F(RealPlan, HasLessErrorThanTheGeneralFitAndCostsLessAtEqualError) {
   options.components = "8";
   const Fitted general8 = fit(options, *reach, *from_full);
   options.region = &reach->region;
-  options.angular = 6;
   options.components = "4";
   const Fitted planned4 = fit(options, *reach, *from_full);
   // Clusters cost no fetches, and over so small a box hardly any bytes.
@@ -96,9 +95,9 @@ TEST_F(RealPlan, HasLessErrorThanTheGeneralFitAndCostsLessAtEqualError) {
                 f.fetches,
                 f.bytes / 1e6);
   EXPECT_LE(planned4.set_rmse, 0.6 * general4.set_rmse);
-  // As drawn, the few nodes over the box are most of the error of both plans (docs/howto/plan.md).
-  EXPECT_LT(planned4.drawn_rmse, general4.drawn_rmse);
+  EXPECT_LE(planned4.drawn_rmse, 0.6 * general4.drawn_rmse);
   EXPECT_LE(planned2.set_rmse, general8.set_rmse);
+  EXPECT_LE(planned2.drawn_rmse, general8.drawn_rmse);
   EXPECT_LE(3 * planned2.fetches, general8.fetches);
   EXPECT_LE(10 * planned2.bytes, general8.bytes);
 }
