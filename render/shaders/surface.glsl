@@ -39,7 +39,8 @@ vec4 target_of(vec3 rgb, float geometry) {
   bvec4 is_bright = greaterThan(target, vec4(kHalfMax));
   bvec4 is_light = lessThan(target, vec4(kFinite));
   for (int i = 0; i < 4; ++i) {
-    if (is_bright[i] && is_light[i]) target[i] = kHalfMax;
+    // Some GPUs store what half floats cannot hold as the largest that they can: white.
+    if (is_bright[i]) target[i] = is_light[i] ? kHalfMax : uintBitsToFloat(0x7f800000u);
   }
   return target;
 }
