@@ -108,8 +108,9 @@ TEST(Grid, KeepsToTheModelsThatAreNamed) {
   for (const Candidate& c : all)
     if (std::ranges::find(named, c.model) != named.end()) expected.push_back(c.key());
   std::vector<std::string> keys;
-  for (const Candidate& c : candidates_of(info(64, false), {.models = named}).value())
-    keys.push_back(c.key());
+  const auto chosen = candidates_of(info(64, false), {.models = named});
+  ASSERT_TRUE(chosen);
+  for (const Candidate& c : *chosen) keys.push_back(c.key());
   EXPECT_EQ(keys, expected);
   EXPECT_LT(keys.size(), all.size());
   EXPECT_GT(keys.size(), 6U);
