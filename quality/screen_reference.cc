@@ -18,9 +18,6 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr double kEncodingExponent = 1.0 / 2.2;  // of the literature's tables
-// Frames of one viewpoint whose light is averaged: the mean of a dithered value over 8 seeds is
-// within 0.18 of a code's step of what was meant, and within 0.06 on the root mean square.
-constexpr std::uint32_t kDitherSeeds = 8;
 
 struct Compared {
   std::vector<int> pixels;
@@ -89,6 +86,10 @@ Status ScreenReferenceOptions::check() const {
     return fail(Errc::kInvalidOption,
                 "comparing on the screen: {} rays along a pixel's side; 1 to 32 can be cast",
                 rays);
+  if (dither_seeds < 1 || dither_seeds > 64)
+    return fail(Errc::kInvalidOption,
+                "comparing on the screen: {} dither seeds of each view; 1 to 64 can be averaged",
+                dither_seeds);
   return {};
 }
 
@@ -96,6 +97,7 @@ struct ScreenReference::State {
   calibration::ProjectorProfile profile;
   std::vector<Viewpoint> viewpoints;
   std::vector<Compared> compared;  // of each viewpoint
+  int dither_seeds = 0;
   Counts counts;
 
   [[nodiscard]] Compared compare(const render::ProbedScreen& screen,
@@ -177,6 +179,7 @@ Result<ScreenReference> ScreenReference::make(const render::Scene& scene,
   auto state = std::make_unique<State>();
   state->profile = profile;
   state->viewpoints = std::move(viewpoints);
+  state->dither_seeds = options.dither_seeds;
   progress.start("looking up what is asked", static_cast<std::int64_t>(screens.size()));
   for (const render::ProbedScreen& screen : screens) {
     state->compared.push_back(state->compare(screen, set));
@@ -201,6 +204,8 @@ Result<ScreenReference> ScreenReference::make(const render::Scene& scene,
 }
 
 std::span<const Viewpoint> ScreenReference::viewpoints() const { return state_->viewpoints; }
+
+int ScreenReference::dither_seeds() const { return state_->dither_seeds; }
 
 const ScreenReference::Counts& ScreenReference::counts() const { return state_->counts; }
 
@@ -257,12 +262,13 @@ Result<ScreenErrors> measure_on_screen(const ScreenReference& reference,
   const int width = profile.geometry.width;
   const int height = profile.geometry.height;
   Image<Rgb32f> target(width, height);
-  std::vector<Image<Rgb16>> codes(kDitherSeeds, Image<Rgb16>(width, height));
+  const auto seeds = static_cast<std::uint32_t>(reference.dither_seeds());
+  std::vector<Image<Rgb16>> codes(seeds, Image<Rgb16>(width, height));
   std::vector<ScreenReference::Frame> frames;
   for (std::size_t v = 0; v < reference.viewpoints().size(); ++v) {
     const Viewpoint& viewpoint = reference.viewpoints()[v];
     render::FrameInput input{viewpoint.eye_in_world, viewpoint.world_from_object};
-    for (; input.dither_seed < kDitherSeeds; ++input.dither_seed) {
+    for (; input.dither_seed < seeds; ++input.dither_seed) {
       renderer->draw(input);
       renderer->read_codes(codes[input.dither_seed].view());
     }

@@ -44,6 +44,8 @@ struct ScreenReferenceOptions {
   /// Along each side of a pixel; what falls between the texels counts. 1 asks for the texel at the
   /// pixel's centre alone. 1 to 32.
   int rays = 8;
+  /// Frames of one viewpoint whose light is averaged, each with another dither. 1 to 64.
+  int dither_seeds = 8;
   /// Errors: kInvalidOption.
   [[nodiscard]] Status check() const;
 };
@@ -76,6 +78,8 @@ class ScreenReference {
   ~ScreenReference();
 
   [[nodiscard]] std::span<const Viewpoint> viewpoints() const;
+  /// As the options had it.
+  [[nodiscard]] int dither_seeds() const;
 
   /// Pixels over all viewpoints: those that are compared, and those looked at and left out.
   struct Counts {

@@ -21,9 +21,8 @@ struct TradeRequest {
   fs::path profile;
   fs::path out;
   fs::path material;
-  std::string grid = "coarse";
-  int iterations = 20;
-  std::uint64_t seed = 1;
+  std::string grid_name = "coarse";
+  quality::GridOptions grid;
   quality::SceneToolsOptions tools;
   quality::Budget budget;
 
@@ -66,7 +65,6 @@ std::string summary(const quality::Trade& trade, const fs::path& page) {
 }
 
 Result<int> trade(const TradeRequest& request, CommandLine& line) {
-  VENEER_ASSIGN(const quality::Grid grid, quality::parse_grid(request.grid));
   VENEER_TRY(request.tools.check());
   VENEER_ASSIGN(const render::Scene scene, render::Scene::load(request.scene));
   VENEER_ASSIGN(const calibration::ProjectorProfile profile,
@@ -80,21 +78,19 @@ Result<int> trade(const TradeRequest& request, CommandLine& line) {
                                      request.scene,
                                      scene.mesh_name,
                                      request.profile,
-                                     grid,
-                                     request.tools,
-                                     request.iterations,
-                                     request.seed));
+                                     request.grid,
+                                     request.tools));
+  VENEER_ASSIGN(const std::vector<quality::Candidate> candidates,
+                quality::candidates_of(set.set().info(), request.grid));
   VENEER_ASSIGN(const quality::SceneTools tools,
                 quality::SceneTools::make(scene, profile, set, request.tools, line.progress()));
-  const std::vector<quality::Candidate> candidates =
-      quality::candidates_of(set.set().info(), grid, request.iterations, request.seed);
   VENEER_ASSIGN(const quality::Trade trade,
                 quality::run_trade(run, candidates, tools.tools(), line.progress()));
 
   TradeAbout about{.set = last_name(request.set),
                    .scene = last_name(request.scene),
                    .profile = last_name(request.profile),
-                   .grid = request.grid,
+                   .grid = request.grid_name,
                    .views = request.tools.views,
                    .frames = request.tools.frames,
                    .white_nits = profile.white().y(),
@@ -141,19 +137,23 @@ Result<int> run_trade(CommandLine& line) {
                  request.out,
                  "The report's folder; a run that was killed goes on in it where it was")
       ->required();
-  app.add_option("--grid", request.grid, "How much is tried: coarse (minutes) or fine (hours)")
+  app.add_option("--grid", request.grid_name, "How much is tried: coarse (minutes) or fine (hours)")
       ->check(CLI::IsMember({"coarse", "fine"}))
       ->capture_default_str();
+  app.add_option("--models",
+                 request.grid.models,
+                 "Only these, with commas; all that the set allows where not given")
+      ->delimiter(',');
   app.add_option("--views", request.tools.views, "Places of the observer that are measured from")
       ->capture_default_str();
   app.add_option("--frames", request.tools.frames, "Timed draws of each way to draw")
       ->capture_default_str();
   app.add_option("--pixels", request.tools.pixels, "Pixels compared from each place")
       ->capture_default_str();
-  app.add_option("--iterations", request.iterations, "Rounds of clustering at most")
+  app.add_option("--iterations", request.grid.iterations, "Rounds of clustering at most")
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
-  app.add_option("--seed", request.seed, "Seed of everything random")->capture_default_str();
+  app.add_option("--seed", request.grid.seed, "Seed of everything random")->capture_default_str();
   app.add_option("--budget-ms", request.budget.ms, "Choose what draws in at most this long");
   app.add_option(
       "--budget-mb", request.budget.mb, "Choose what takes at most this much of the GPU's memory");
@@ -163,6 +163,7 @@ Result<int> run_trade(CommandLine& line) {
                  "cheapest");
   app.add_option("--material", request.material, "Write the chosen material, NAME.safetensors");
   line.parse();
+  VENEER_ASSIGN(request.grid.grid, quality::parse_grid(request.grid_name));
   if (!request.material.empty() && !request.has_budget())
     return fail(Errc::kInvalidOption,
                 "--material {}: nothing says which is wanted; add --budget-ms, --budget-mb or "

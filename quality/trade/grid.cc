@@ -19,7 +19,8 @@ struct Sizes {
   std::vector<int> lobes;
   std::vector<int> clusters;
   std::vector<int> angular;
-  std::vector<DrawingOptions> drawings;
+  std::vector<DrawingOptions> drawings;        ///< of a model's first fit
+  std::vector<DrawingOptions> other_drawings;  ///< of its others
 };
 
 DrawingOptions drawing(int spacing, bool average, double scale) {
@@ -43,26 +44,29 @@ Sizes sizes_of(Grid grid) {
                          drawing(0, true, 0.5),
                          drawing(16, false, 1),
                          drawing(16, true, 1),
-                         drawing(16, true, 0.5)}};
+                         drawing(16, true, 0.5)},
+            .other_drawings = {drawing(0, true, 1), drawing(16, true, 1)}};
+  const std::vector<DrawingOptions> drawings{drawing(0, false, 1),
+                                             drawing(0, true, 1),
+                                             drawing(0, false, 0.5),
+                                             drawing(0, true, 0.7),
+                                             drawing(0, true, 0.5),
+                                             drawing(8, false, 1),
+                                             drawing(8, true, 1),
+                                             drawing(16, false, 1),
+                                             drawing(16, true, 1),
+                                             drawing(16, true, 0.7),
+                                             drawing(16, true, 0.5),
+                                             drawing(32, false, 1),
+                                             drawing(32, true, 1)};
   return {.one_term = {"4", "1", "2", "3", "6", "8", "12"},
           .two_terms = {"3+1", "2+2", "4+2", "6+2", "4+4", "8+4"},
           .images = {"16", "4", "8", "12"},
           .lobes = {2, 1, 3, 4},
           .clusters = {32, 4, 8, 16, 64},
           .angular = {16, 6, 8, 12, 24},
-          .drawings = {drawing(0, false, 1),
-                       drawing(0, true, 1),
-                       drawing(0, false, 0.5),
-                       drawing(0, true, 0.7),
-                       drawing(0, true, 0.5),
-                       drawing(8, false, 1),
-                       drawing(8, true, 1),
-                       drawing(16, false, 1),
-                       drawing(16, true, 1),
-                       drawing(16, true, 0.7),
-                       drawing(16, true, 0.5),
-                       drawing(32, false, 1),
-                       drawing(32, true, 1)}};
+          .drawings = drawings,
+          .other_drawings = drawings};
 }
 
 /// The fits of one model: all numbers of components, or of lobes, at the usual sizes; the other
@@ -116,23 +120,35 @@ Result<Grid> parse_grid(std::string_view text) {
 
 std::string_view name_of(Grid grid) { return grid == Grid::kCoarse ? "coarse" : "fine"; }
 
-std::vector<Candidate> candidates_of(const btf::SampleSetInfo& set,
-                                     Grid grid,
-                                     int iterations,
-                                     std::uint64_t seed) {
-  FitOptions base;
-  base.iterations = iterations;
-  base.seed = seed;
+Result<std::vector<Candidate>> candidates_of(const btf::SampleSetInfo& set,
+                                             const GridOptions& options) {
+  for (const std::string& name : options.models) {
+    VENEER_ASSIGN(const btf::Model* model, btf::find_model(name));
+    if (model->polarised && !set.polarised)
+      return fail(Errc::kInvalidOption,
+                  "measuring the trade: {} needs a set whose specular part was measured by itself, "
+                  "and this one has none; leave that model out",
+                  name);
+  }
+  btf::FitOptions base;
+  base.iterations = options.iterations;
+  base.seed = options.seed;
+  const Sizes sizes = sizes_of(options.grid);
   std::vector<Candidate> candidates;
   std::set<std::string> seen;
   for (const btf::Model& model : btf::models()) {
     if (model.polarised && !set.polarised) continue;
-    for (const FitOptions& fit : fits_of(model, set, grid, base)) {
-      for (const DrawingOptions& drawing : sizes_of(grid).drawings) {
+    if (!options.models.empty() &&
+        std::ranges::find(options.models, model.name) == options.models.end())
+      continue;
+    bool first = true;
+    for (const FitOptions& fit : fits_of(model, set, options.grid, base)) {
+      for (const DrawingOptions& drawing : first ? sizes.drawings : sizes.other_drawings) {
         Candidate candidate{std::string(model.name), fit, drawing};
         // The cache of a model that offers none is no way of its own.
         if (seen.insert(candidate.key()).second) candidates.push_back(std::move(candidate));
       }
+      first = false;
     }
   }
   return candidates;

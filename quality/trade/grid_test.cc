@@ -16,6 +16,10 @@ btf::SampleSetInfo info(int side, bool polarised) {
   return set;
 }
 
+std::vector<Candidate> all_of(const btf::SampleSetInfo& set, Grid grid) {
+  return candidates_of(set, {.grid = grid}).value();
+}
+
 std::set<std::string> models_in(const std::vector<Candidate>& candidates) {
   std::set<std::string> models;
   for (const Candidate& c : candidates) models.insert(c.model);
@@ -28,7 +32,7 @@ TEST(Grid, HasEveryModelThatTheSetAllows) {
       std::set<std::string> allowed;
       for (const btf::Model& model : btf::models())
         if (polarised || !model.polarised) allowed.emplace(model.name);
-      EXPECT_EQ(models_in(candidates_of(info(64, polarised), grid, 20, 1)), allowed);
+      EXPECT_EQ(models_in(all_of(info(64, polarised), grid)), allowed);
     }
   }
 }
@@ -37,7 +41,7 @@ TEST(Grid, ListsEachWayToDrawOnce) {
   for (const Grid grid : {Grid::kCoarse, Grid::kFine}) {
     std::set<std::string> keys;
     std::set<std::string> names;
-    for (const Candidate& c : candidates_of(info(64, true), grid, 20, 1)) {
+    for (const Candidate& c : all_of(info(64, true), grid)) {
       EXPECT_TRUE(keys.insert(c.key()).second) << c.key();
       EXPECT_TRUE(names.insert(c.name()).second) << c.name();
     }
@@ -47,7 +51,7 @@ TEST(Grid, ListsEachWayToDrawOnce) {
 TEST(Grid, PutsWhatSharesAFitSideBySide) {
   std::set<std::string> finished;
   std::string last;
-  for (const Candidate& c : candidates_of(info(64, true), Grid::kFine, 20, 1)) {
+  for (const Candidate& c : all_of(info(64, true), Grid::kFine)) {
     if (c.fit_key() == last) continue;
     EXPECT_FALSE(finished.contains(c.fit_key())) << c.fit_key();
     finished.insert(last);
@@ -57,7 +61,7 @@ TEST(Grid, PutsWhatSharesAFitSideBySide) {
 
 TEST(Grid, VariesEverySize) {
   for (const Grid grid : {Grid::kCoarse, Grid::kFine}) {
-    const auto candidates = candidates_of(info(64, true), grid, 20, 1);
+    const auto candidates = all_of(info(64, true), grid);
     const auto values = [&](auto of) {
       std::set<decltype(of(candidates.front()))> set;
       for (const Candidate& c : candidates) set.insert(of(c));
@@ -77,7 +81,7 @@ TEST(Grid, VariesEverySize) {
 TEST(Grid, HoldsOnlyWhatAFitAndARendererTake) {
   for (const int side : {1, 3, 64}) {
     for (const Grid grid : {Grid::kCoarse, Grid::kFine}) {
-      for (const Candidate& c : candidates_of(info(side, true), grid, 20, 1)) {
+      for (const Candidate& c : all_of(info(side, true), grid)) {
         EXPECT_TRUE(c.fit.check()) << c.name();
         EXPECT_TRUE(c.drawing.check()) << c.name();
         if (reads_of(c.model).clusters) {
@@ -89,12 +93,38 @@ TEST(Grid, HoldsOnlyWhatAFitAndARendererTake) {
 }
 
 TEST(Grid, IsOfMinutesOrOfHours) {
-  const auto coarse = candidates_of(info(64, true), Grid::kCoarse, 20, 1);
-  const auto fine = candidates_of(info(64, true), Grid::kFine, 20, 1);
+  const auto coarse = all_of(info(64, true), Grid::kCoarse);
+  const auto fine = all_of(info(64, true), Grid::kFine);
   EXPECT_GT(coarse.size(), 40U);
-  EXPECT_LT(coarse.size(), 160U);
+  EXPECT_LT(coarse.size(), 90U);
   EXPECT_GT(fine.size(), 3 * coarse.size());
   EXPECT_LT(fine.size(), 1000U);
+}
+
+TEST(Grid, KeepsToTheModelsThatAreNamed) {
+  const auto all = all_of(info(64, false), Grid::kCoarse);
+  const std::vector<std::string> named{"texel-colours", "phong"};
+  std::vector<std::string> expected;
+  for (const Candidate& c : all)
+    if (std::ranges::find(named, c.model) != named.end()) expected.push_back(c.key());
+  std::vector<std::string> keys;
+  const auto chosen = candidates_of(info(64, false), {.models = named});
+  ASSERT_TRUE(chosen);
+  for (const Candidate& c : *chosen) keys.push_back(c.key());
+  EXPECT_EQ(keys, expected);
+  EXPECT_LT(keys.size(), all.size());
+  EXPECT_GT(keys.size(), 6U);
+}
+
+TEST(Grid, RefusesModelsThatCannotBeMeasured) {
+  const auto unknown = candidates_of(info(64, false), {.models = {"fresnel"}});
+  ASSERT_FALSE(unknown);
+  EXPECT_NE(unknown.error().what.find("fresnel"), std::string::npos);
+  for (const btf::Model& model : btf::models()) {
+    const GridOptions only{.models = {std::string(model.name)}};
+    EXPECT_TRUE(candidates_of(info(64, true), only)) << model.name;
+    EXPECT_EQ(candidates_of(info(64, false), only).has_value(), !model.polarised) << model.name;
+  }
 }
 
 TEST(Grid, HasANameThatReadsBack) {

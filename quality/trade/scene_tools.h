@@ -61,9 +61,7 @@ class SceneTools {
     const std::filesystem::path& scene,
     const std::string& mesh_name,
     const std::filesystem::path& profile,
-    Grid grid,
-    const SceneToolsOptions& options,
-    int iterations,
-    std::uint64_t seed);
+    const GridOptions& grid,
+    const SceneToolsOptions& options);
 
 }  // namespace veneer::quality
