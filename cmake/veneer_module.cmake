@@ -12,7 +12,7 @@ if(CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   target_compile_options(veneer_options INTERFACE -march=x86-64-v3)
 endif()
 
-include(precompiled)
+include(${CMAKE_CURRENT_LIST_DIR}/precompiled.cmake)
 
 # Every test program, so that a sanitizer build can ask for these alone.
 add_custom_target(veneer_tests)
