@@ -7,6 +7,8 @@
 #include <thread>
 #include <vector>
 
+#include "base/processor_time.h"
+
 namespace veneer::cli {
 
 /// Threads that want a processor all the time, as `yes` does, until they are destroyed.
@@ -22,17 +24,11 @@ class BusyThreads {
 /// the kernel does not tell.
 class OtherPrograms {
  public:
-  OtherPrograms() : begin_(look()) {}
+  OtherPrograms() : begin_(processor_time()) {}
   [[nodiscard]] std::optional<double> share() const;
 
  private:
-  struct Look {
-    double second = 0;
-    double all_s = 0;   ///< processor time that anyone used
-    double ours_s = 0;  ///< of this
-  };
-  static std::optional<Look> look();
-  std::optional<Look> begin_;
+  std::optional<ProcessorTime> begin_;
 };
 
 }  // namespace veneer::cli

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <chrono>
 #include <optional>
+
+#include "base/processor_time.h"
 
 namespace veneer::soak {
 
@@ -14,13 +15,7 @@ class MachineLoad {
   bool busy();
 
  private:
-  struct Look {
-    std::chrono::steady_clock::time_point time;
-    double all_s = 0;   ///< processor time that anyone used
-    double ours_s = 0;  ///< of this
-  };
-  static std::optional<Look> look();
-  std::optional<Look> last_;
+  std::optional<ProcessorTime> last_;
   bool busy_ = false;
 };
 
