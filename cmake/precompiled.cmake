@@ -1,7 +1,6 @@
 # What nearly every file includes, parsed once for all: a build from nothing takes about half as
 # long. Off by default, since it hides includes that are missing, and keeps the compiler cache from
-# helping; the gate, which begins with nothing, switches it on for g++ and builds parts of the house
-# with clang without it.
+# helping; the gate, which begins with nothing, switches it on.
 option(VENEER_PRECOMPILE "Parse common headers once: for builds from nothing" OFF)
 
 set(veneer_common_headers
@@ -23,8 +22,10 @@ if(VENEER_PRECOMPILE)
   # Some libraries ask for it, and all who share must agree.
   target_compile_options(veneer_options INTERFACE -pthread)
   # g++ 12 forgets there which headers are the system's, and warns of what it inlines from them.
-  # Warnings are errors wherever nothing is precompiled.
-  set(CMAKE_COMPILE_WARNING_AS_ERROR OFF)
+  # Warnings are errors wherever else.
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    set(CMAKE_COMPILE_WARNING_AS_ERROR OFF)
+  endif()
   veneer_add_precompiled(veneer_precompiled "${veneer_common_headers}" Eigen3::Eigen fmt::fmt)
   if(VENEER_TESTS)
     veneer_add_precompiled(veneer_precompiled_tests

@@ -17,29 +17,42 @@ include(${CMAKE_CURRENT_LIST_DIR}/precompiled.cmake)
 # Every test program, so that a sanitizer build can ask for these alone.
 add_custom_target(veneer_tests)
 
-# veneer_add_test(NAME SRCS ... [DEPS ...])
+# veneer_add_test(NAME SRCS ... [DEPS ...] [HALVES])
 #
-# Makes the GoogleTest program veneer_NAME_test and the ctest NAME; its results go to
-# test-results/NAME.xml, where ./dev test counts the cases. A test that draws is labelled gl.
+# Makes the GoogleTest program veneer_NAME_test and the ctest NAME, or two of half its cases each,
+# NAME_1 and NAME_2, for what takes long; their results go to test-results/, where ./dev test counts
+# the cases. A test that draws is labelled gl.
 function(veneer_add_test name)
-  cmake_parse_arguments(T "" "" "SRCS;DEPS" ${ARGN})
+  cmake_parse_arguments(T "HALVES" "" "SRCS;DEPS" ${ARGN})
   add_executable(veneer_${name}_test ${T_SRCS})
   target_link_libraries(veneer_${name}_test PRIVATE ${T_DEPS} GTest::gtest GTest::gmock
                                                     GTest::gtest_main)
   veneer_use_precompiled(veneer_${name}_test veneer_precompiled_tests)
   add_dependencies(veneer_tests veneer_${name}_test)
-  add_test(NAME ${name} COMMAND veneer_${name}_test)
   # Real measured data; tests that need it skip, saying so, where it is absent.
   set(data ${CMAKE_SOURCE_DIR}/../shared/data)
   if(DEFINED ENV{VENEER_DATA})
     set(data $ENV{VENEER_DATA})
   endif()
-  set_property(TEST ${name} PROPERTY ENVIRONMENT
-    "VENEER_DATA=${data}" "GTEST_OUTPUT=xml:${CMAKE_BINARY_DIR}/test-results/${name}.xml")
   veneer_uses_gl(gl ${T_DEPS})
-  if(gl)
-    set_property(TEST ${name} PROPERTY LABELS gl)
+  set(runs ${name})
+  if(T_HALVES)
+    set(runs ${name}_1 ${name}_2)
   endif()
+  set(index 0)
+  foreach(run IN LISTS runs)
+    add_test(NAME ${run} COMMAND veneer_${name}_test)
+    set_property(TEST ${run} PROPERTY ENVIRONMENT
+      "VENEER_DATA=${data}" "GTEST_OUTPUT=xml:${CMAKE_BINARY_DIR}/test-results/${run}.xml")
+    if(T_HALVES)
+      set_property(TEST ${run} APPEND PROPERTY ENVIRONMENT
+        GTEST_TOTAL_SHARDS=2 GTEST_SHARD_INDEX=${index})
+      math(EXPR index "${index} + 1")
+    endif()
+    if(gl)
+      set_property(TEST ${run} PROPERTY LABELS gl)
+    endif()
+  endforeach()
 endfunction()
 
 # veneer_add_bus_test(NAME SRCS ... [DEPS ...])
