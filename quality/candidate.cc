@@ -104,13 +104,16 @@ std::string nearest_miss(std::span<const TradePoint> points,
     }
   }
   const bool others = bounds.size() > 1;
-  return fmt::format("the least {}{} is {:.4g} ({})",
-                     bound.unit,
-                     !others      ? ""
-                     : best_keeps ? " that keeps to the rest"
-                                  : ", though it misses another bound,",
-                     bound.of(points[best]),
-                     points[best].candidate.name());
+  const double value = bound.of(points[best]);
+  return fmt::format(
+      "the least {}{} is {:.4g} ({}{})",
+      bound.unit,
+      !others      ? ""
+      : best_keeps ? " that keeps to the rest"
+                   : ", though it misses another bound,",
+      value,
+      points[best].candidate.name(),
+      value > bound.most ? fmt::format("; {:.3g} {} over", value - bound.most, bound.unit) : "");
 }
 
 }  // namespace
@@ -216,26 +219,38 @@ std::string Candidate::key() const {
   return key;
 }
 
+bool TradePoint::has_idle_cache() const {
+  constexpr double kIdle = 0.01;
+  return candidate.drawing.cache.spacing > 0 && cache_served < kIdle;
+}
+
 std::vector<std::size_t> pareto_front(std::span<const TradePoint> points,
                                       double TradePoint::*cost,
-                                      double TradePoint::*error) {
+                                      double TradePoint::*error,
+                                      double least_gain) {
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < points.size(); ++i)
-    if (is_finite(points[i], cost, error)) order.push_back(i);
+    if (is_finite(points[i], cost, error) && !points[i].has_idle_cache()) order.push_back(i);
   std::ranges::stable_sort(
       order, {}, [&](std::size_t i) { return std::pair(points[i].*cost, points[i].*error); });
-  // From the cheapest on, a point is on the front if its error is under all before it, or if it
-  // equals the last of them in both.
+  // From the cheapest on, a point is on the front if its error is enough under all before it, or if
+  // it equals the last of them in both.
   std::vector<std::size_t> front;
   for (const std::size_t i : order) {
     if (!front.empty()) {
       const TradePoint& last = points[front.back()];
       const bool equal = points[i].*cost == last.*cost && points[i].*error == last.*error;
-      if (!equal && !(points[i].*error < last.*error)) continue;
+      const double gain = last.*error - points[i].*error;
+      if (!equal && !(gain > 0.0 && gain >= least_gain)) continue;
     }
     front.push_back(i);
   }
   return front;
+}
+
+std::vector<std::size_t> pareto_front(std::span<const TradePoint> points,
+                                      double TradePoint::*cost) {
+  return pareto_front(points, cost, &TradePoint::received_de00_mean, kLeastGain);
 }
 
 Result<std::size_t> choose(std::span<const TradePoint> points, const Budget& budget) {
@@ -250,27 +265,28 @@ Result<std::size_t> choose(std::span<const TradePoint> points, const Budget& bud
   for (std::size_t i = 0; i < points.size(); ++i) {
     const TradePoint& p = points[i];
     if (std::isfinite(p.ms_median) && std::isfinite(p.gpu_bytes) &&
-        std::isfinite(p.received_de00_mean))
+        std::isfinite(p.received_de00_mean) && !p.has_idle_cache())
       usable.push_back(i);
   }
   if (usable.empty())
     return fail(
         Errc::kInvalidOption,
         "choosing a way to draw: none was measured; look at what the run left out, and why");
-  const bool by_cost = budget.de00 && !budget.ms && !budget.mb;
-  const auto rank = [&](std::size_t i) {
-    const TradePoint& p = points[i];
-    const double error = p.received_de00_mean;
-    return by_cost ? std::tuple(p.ms_median, error, p.gpu_bytes)
-                   : std::tuple(error, p.ms_median, p.gpu_bytes);
-  };
-  std::optional<std::size_t> best;
-  for (const std::size_t i : usable) {
-    const bool keeps = std::ranges::all_of(
-        bounds, [&](const Bound& bound) { return bound.of(points[i]) <= bound.most; });
-    if (keeps && (!best || rank(i) < rank(*best))) best = i;
+  std::vector<std::size_t> keeping;
+  for (const std::size_t i : usable)
+    if (std::ranges::all_of(bounds,
+                            [&](const Bound& bound) { return bound.of(points[i]) <= bound.most; }))
+      keeping.push_back(i);
+  if (!keeping.empty()) {
+    const auto error = [&](std::size_t i) { return points[i].received_de00_mean; };
+    const bool by_cost = budget.de00 && !budget.ms && !budget.mb;
+    const double most =
+        by_cost ? *budget.de00 : error(*std::ranges::min_element(keeping, {}, error)) + kLeastGain;
+    std::erase_if(keeping, [&](std::size_t i) { return error(i) > most; });
+    return *std::ranges::min_element(keeping, {}, [&](std::size_t i) {
+      return std::tuple(points[i].ms_median, error(i), points[i].gpu_bytes);
+    });
   }
-  if (best) return *best;
   std::vector<std::string> asked;
   std::vector<std::string> misses;
   for (const Bound& bound : bounds) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -61,14 +62,34 @@ struct TradePoint {
   double received_de00_mean = 0;  ///< on the screen, after compensation and quantisation
   double received_de00_p95 = 0;
   double received_de00_max = 0;
+  /// The part of the triangles that came from the angular cache; NaN where it is off or unknown.
+  double cache_served = std::numeric_limits<double>::quiet_NaN();
+
+  /// Draws what it would without a cache, and fills one beside: under 1 % comes from it.
+  [[nodiscard]] bool has_idle_cache() const;
 };
 
-/// Which of `points` no other one beats: of two points one beats the other if it is no worse in
-/// `cost` and `error` and better in one. Sorted by cost, cheapest first. Points that are not finite
-/// are on no front.
+/// Mean dE00 by which a dearer way must be nearer to be worth anything: a fiftieth of what is seen
+/// (0.5), and no more than a mean over 4 x 2000 pixels moves when others are compared
+/// (docs/measured.md, "The trade").
+constexpr double kLeastGain = 0.01;
+
+/// Which of `points` are worth their cost. With `least_gain` 0 those that no other one beats: of
+/// two points one beats the other if it is no worse in `cost` and `error` and better in one. Above
+/// 0, from the cheapest on, a point must have less error than the last one by that much, so that
+/// what is left out is at most `least_gain` nearer than a point of the front that costs no more.
+/// Sorted by cost, cheapest first. Points that are not finite or have an idle cache are on no
+/// front.
+/// @param least_gain  in the unit of `error`, >= 0.
 [[nodiscard]] std::vector<std::size_t> pareto_front(std::span<const TradePoint> points,
                                                     double TradePoint::*cost,
-                                                    double TradePoint::*error);
+                                                    double TradePoint::*error,
+                                                    double least_gain);
+
+/// The front of the error received against a cost, with kLeastGain: what reports and the daemon's
+/// ladder go by.
+[[nodiscard]] std::vector<std::size_t> pareto_front(std::span<const TradePoint> points,
+                                                    double TradePoint::*cost);
 
 /// What a point must keep to; nothing where not asked for.
 struct Budget {
@@ -76,9 +97,9 @@ struct Budget {
   std::optional<double> mb;    ///< of GPU memory, 1e6 bytes
   std::optional<double> de00;  ///< the mean after compensation
 };
-/// The point of least error that keeps to the budget; of equal ones the cheaper. Where only de00 is
-/// given, the cheapest that keeps to it. Errors: kInvalidOption, naming the nearest miss of each
-/// bound.
+/// The cheapest of those that keep to the budget and have its least error, or kLeastGain more at
+/// most. Where only de00 is given, the cheapest that keeps to it. None with an idle cache. Errors:
+/// kInvalidOption, naming the nearest miss of each bound.
 [[nodiscard]] Result<std::size_t> choose(std::span<const TradePoint> points, const Budget& budget);
 
 }  // namespace veneer::quality

@@ -33,7 +33,7 @@ bool beats(const TradePoint& a, const TradePoint& b) {
 }
 
 std::vector<std::size_t> front_of(std::span<const TradePoint> points) {
-  return pareto_front(points, &TradePoint::ms_median, &TradePoint::received_de00_mean);
+  return pareto_front(points, &TradePoint::ms_median, &TradePoint::received_de00_mean, 0);
 }
 
 // Few distinct values, so that ties are common.
@@ -100,6 +100,62 @@ TEST(ParetoFront, KeepsBothOfTwoEqualPoints) {
   EXPECT_EQ(front_of(points), (std::vector<std::size_t>{0, 2, 1}));
 }
 
+TEST(ParetoFront, TakesNothingDearerForAGainThatNobodySees) {
+  Pcg32 random(15);
+  constexpr double kGain = 0.25;
+  for (int trial = 0; trial < 300; ++trial) {
+    std::vector<TradePoint> points;
+    for (int i = 0; i < trial % 40; ++i)
+      points.push_back(point(random.uniform(), random.uniform()));
+    const std::vector<std::size_t> front =
+        pareto_front(points, &TradePoint::ms_median, &TradePoint::received_de00_mean, kGain);
+    for (std::size_t k = 1; k < front.size(); ++k)
+      EXPECT_GE(points[front[k - 1]].received_de00_mean - points[front[k]].received_de00_mean,
+                kGain);
+    // What is not on it is at most that much nearer than something on it that costs no more.
+    for (const TradePoint& p : points)
+      EXPECT_TRUE(std::ranges::any_of(front,
+                                      [&](std::size_t i) {
+                                        return points[i].ms_median <= p.ms_median &&
+                                               points[i].received_de00_mean <=
+                                                   p.received_de00_mean + kGain;
+                                      }))
+          << "trial " << trial;
+  }
+}
+
+TEST(ParetoFront, OfReportsHasATolerance) {
+  const std::vector<TradePoint> points{
+      point(1, 0.5), point(2, 0.5 - 0.9 * kLeastGain), point(3, 0.5 - 1.1 * kLeastGain)};
+  EXPECT_EQ(pareto_front(points, &TradePoint::ms_median), (std::vector<std::size_t>{0, 2}));
+  EXPECT_EQ(front_of(points), (std::vector<std::size_t>{0, 1, 2}));
+}
+
+TradePoint cached(TradePoint p, double served) {
+  p.candidate.model = "lpca";
+  p.candidate.drawing.cache.spacing = 16;
+  p.cache_served = served;
+  return p;
+}
+
+TEST(ParetoFront, LeavesOutACacheThatServesNothing) {
+  // The idle one is the cheapest by the noise of a clock.
+  const std::vector<TradePoint> points{cached(point(1, 0.5), 0),
+                                       point(1.01, 0.5),
+                                       cached(point(0.5, 0.6), 0.4),
+                                       cached(point(0.4, 0.7), kNan)};
+  EXPECT_EQ(front_of(points), (std::vector<std::size_t>{3, 2, 1}));
+  EXPECT_EQ(choose(points, {}).value(), 1U);
+  EXPECT_TRUE(points[0].has_idle_cache());
+  EXPECT_TRUE(cached(point(1, 1), 0.0099).has_idle_cache());
+  EXPECT_FALSE(cached(point(1, 1), 0.01).has_idle_cache());
+  EXPECT_FALSE(point(1, 1).has_idle_cache());
+  // A share that was noted of a way without a cache is of nothing.
+  TradePoint off = cached(point(1, 1), 0);
+  off.candidate.drawing.cache.spacing = 0;
+  EXPECT_FALSE(off.has_idle_cache());
+}
+
 TEST(ParetoFront, OfNothingIsEmpty) { EXPECT_TRUE(front_of({}).empty()); }
 
 TEST(Choose, FindsTheLeastErrorThatKeepsToEveryBound) {
@@ -135,6 +191,13 @@ TEST(Choose, FindsTheCheapestWhereOnlyTheErrorIsBounded) {
   EXPECT_EQ(choose(points, {}).value(), 0U);
 }
 
+TEST(Choose, TakesTheCheaperOfTwoThatNobodyTellsApart) {
+  const std::vector<TradePoint> points{
+      point(9, 0.5), point(3, 0.5 + 0.9 * kLeastGain), point(1, 0.5 + 1.1 * kLeastGain)};
+  EXPECT_EQ(choose(points, {}).value(), 1U);
+  EXPECT_EQ(choose(points, {.ms = 10, .mb = {}, .de00 = 0.505}).value(), 0U);
+}
+
 TEST(Choose, TakesABoundAsReached) {
   const std::vector<TradePoint> points{point(3, 1, 2)};
   EXPECT_TRUE(choose(points, {.ms = 3, .mb = 2, .de00 = 1}));
@@ -148,15 +211,16 @@ TEST(Choose, NamesTheNearestMissOfEachBound) {
   const auto none = choose(points, {.ms = 5, .mb = 1.5, .de00 = 0.5});
   ASSERT_FALSE(none);
   EXPECT_EQ(none.error().code, Errc::kInvalidOption);
-  for (const char* part : {"5 ms and 1.5 MB and 0.5 dE00",
-                           "the least MB that keeps to the rest is 9 (lafortune 1 lobe)",
-                           "the least dE00 that keeps to the rest is 0.9 (phong)",
-                           "the least ms, though it misses another bound, is 4 (phong)"})
+  for (const char* part :
+       {"5 ms and 1.5 MB and 0.5 dE00",
+        "the least MB that keeps to the rest is 9 (lafortune 1 lobe; 7.5 MB over)",
+        "the least dE00 that keeps to the rest is 0.9 (phong; 0.4 dE00 over)",
+        "the least ms, though it misses another bound, is 4 (phong)"})
     EXPECT_NE(none.error().what.find(part), std::string::npos)
         << part << " in " << none.error().what;
   const auto alone = choose(points, {.ms = 1, .mb = {}, .de00 = {}});
   ASSERT_FALSE(alone);
-  EXPECT_NE(alone.error().what.find("the least ms is 4 (phong)"), std::string::npos)
+  EXPECT_NE(alone.error().what.find("the least ms is 4 (phong; 3 ms over)"), std::string::npos)
       << alone.error().what;
 }
 

@@ -181,8 +181,7 @@ Ladder ladder_of(const fs::path& material, bool offers_cache, const render::Draw
 }
 
 Ladder ladder_of(std::span<const TradePoint> points, const fs::path& materials) {
-  const std::vector<std::size_t> front =
-      pareto_front(points, &TradePoint::ms_median, &TradePoint::received_de00_mean);
+  const std::vector<std::size_t> front = pareto_front(points, &TradePoint::ms_median);
   // A step that saves less than this is not worth that anybody sees it, and load varies as much.
   constexpr double kLeastStep = 0.85;
   constexpr double kWider = 0.95;

@@ -46,8 +46,8 @@ struct Ladder {
                                bool offers_cache,
                                const render::DrawingOptions& best);
 
-/// The measured front of error against time, thinned until each rung costs clearly less than the
-/// one before it and no more than kMost are left. Empty where no point is finite.
+/// The measured front of error against time (pareto_front), thinned until each rung costs clearly
+/// less than the one before it and no more than kMost are left. Empty where no point is finite.
 /// @param materials  the folder that holds Candidate::fit_key().safetensors
 [[nodiscard]] Ladder ladder_of(std::span<const TradePoint> points,
                                const std::filesystem::path& materials);

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "base/files.h"
 #include "base/random.h"
 #include "base/testing/temporary_folder.h"
@@ -167,8 +169,7 @@ TEST(LadderOfPoints, GoesDownTheFrontInClearStepsFromTheBest) {
       EXPECT_TRUE(ladder.rungs.empty());
       continue;
     }
-    const auto front =
-        pareto_front(points, &TradePoint::ms_median, &TradePoint::received_de00_mean);
+    const auto front = pareto_front(points, &TradePoint::ms_median);
     EXPECT_EQ(ladder.rungs.front().de00_mean, points[front.back()].received_de00_mean);
     for (std::size_t i = 1; i < ladder.rungs.size(); ++i)
       EXPECT_LE(ladder.rungs[i].ratio, 0.85 * ladder.rungs[i - 1].ratio);
@@ -177,6 +178,24 @@ TEST(LadderOfPoints, GoesDownTheFrontInClearStepsFromTheBest) {
     const Status saved = ladder.save(folder.path() / "ladder.toml");
     EXPECT_TRUE(saved) << saved.error().what;
   }
+}
+
+TEST(LadderOfPoints, HasNoRungThatNobodyWouldSeeAndNoneWithAnIdleCache) {
+  TradePoint good;
+  good.candidate.model = "lpca";
+  good.ms_median = good.ratio = 4;
+  good.received_de00_mean = 0.5;
+  TradePoint dearer = good;  // twice the time for what is not seen
+  dearer.ms_median = dearer.ratio = 8;
+  dearer.received_de00_mean = 0.495;
+  TradePoint idle = good;
+  idle.candidate.drawing.cache.spacing = 16;
+  idle.cache_served = 0;
+  idle.ms_median = idle.ratio = 3;
+  const Ladder ladder = ladder_of(std::array{dearer, idle, good}, "m");
+  ASSERT_EQ(ladder.rungs.size(), 1U);
+  EXPECT_EQ(ladder.rungs.front().ratio, 4);
+  EXPECT_EQ(ladder.rungs.front().drawing.cache.spacing, 0);
 }
 
 }  // namespace

@@ -56,7 +56,8 @@ struct RenderTiming {
   double ratio = 0;           ///< of the medians, to "plain"
   int fetches = 0;            ///< texture fetches per pixel and light
   std::size_t gpu_bytes = 0;  ///< the cache or the surface's points included
-  /// The part of the triangles that are drawn from the angular cache; none where it is not used.
+  /// The part of the triangles that are drawn from the angular cache, the mean over viewpoints;
+  /// none where it is not used.
   std::optional<double> served{};
   /// Of what is drawn against the full set at the pixels' own directions (ScreenError), encoded.
   std::optional<double> screen_epsilon{};

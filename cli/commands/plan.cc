@@ -4,8 +4,10 @@
 #include <nlohmann/json.hpp>
 
 #include "base/exit_code.h"
+#include "btf/interpolated_set.h"
 #include "cli/commands/commands.h"
 #include "quality/plan/frame_time.h"
+#include "quality/plan/on_screen.h"
 #include "quality/plan/plan_report.h"
 
 namespace veneer::cli {
@@ -19,6 +21,7 @@ Result<int> run_plan(CommandLine& line) {
   quality::PlanOptions options;
   double frame_ms = 0;
   bool no_general = false;
+  bool on_screen = false;
   CLI::App& app = line.app();
   app.add_option("set", set_path, "The sample set, NAME.btfset")->required();
   app.add_option("--scene",
@@ -38,6 +41,10 @@ Result<int> run_plan(CommandLine& line) {
       ->delimiter(',');
   app.add_flag(
       "--no-general", no_general, "Do not fit for any scene too, which only tells what was saved");
+  app.add_flag("--on-screen",
+               on_screen,
+               "Also draw what was planned and the fits for any scene, and measure them on the "
+               "projector's raster; needs a GPU or its emulation");
   app.add_option("--report", page, "Also write what was found as one page, NAME.html");
   app.add_option("--seed", options.seed, "Seed of everything random")->capture_default_str();
   line.parse();
@@ -54,8 +61,11 @@ Result<int> run_plan(CommandLine& line) {
   const quality::TimeMaterial time = [&](const btf::Material& material) {
     return quality::draw_ms(scene, profile, material);
   };
-  VENEER_ASSIGN(const quality::Plan plan,
+  VENEER_ASSIGN(quality::Plan plan,
                 quality::make_plan(set, scene, profile, options, time, line.progress()));
+  if (on_screen)
+    VENEER_TRY(quality::measure_plan_on_screen(
+        plan, btf::InterpolatedSet(set), scene, profile, line.progress()));
   const quality::PlanSource source{set_path.string(), scene_path.string(), profile_path.string()};
   VENEER_TRY(btf::save_material(
       *plan.chosen.material, out, quality::plan_provenance(plan, source, set.info())));

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
+#include <cstdio>
 #include <optional>
 
 #include "base/exit_code.h"
@@ -33,12 +35,17 @@ std::string last_name(const fs::path& path) {
   return (path / "").parent_path().filename().string();
 }
 
+std::string in_bytes(double bytes) {
+  return bytes < 1e5 ? fmt::format("{:.1f} kB", bytes / 1e3)
+                     : fmt::format("{:.1f} MB", bytes / 1e6);
+}
+
 std::string in_words(const quality::TradePoint& p) {
-  return fmt::format("{}: {:.2f} ms ({:.1f} x plain), {:.1f} MB, {:.2f} dE00 (95 %: {:.2f})",
+  return fmt::format("{}: {:.2f} ms ({:.1f} x plain), {}, {:.2f} dE00 (95 %: {:.2f})",
                      p.candidate.name(),
                      p.ms_median,
                      p.ratio,
-                     p.gpu_bytes / 1e6,
+                     in_bytes(p.gpu_bytes),
                      p.received_de00_mean,
                      p.received_de00_p95);
 }
@@ -57,10 +64,16 @@ std::string summary(const quality::Trade& trade, const fs::path& page) {
                                  trade.left_out.size(),
                                  trade.renderer,
                                  trade.clock);
-  text += "\nno other way to draw is both cheaper and nearer than one of these:";
-  for (const std::size_t i : quality::pareto_front(
-           trade.points, &quality::TradePoint::ms_median, &quality::TradePoint::received_de00_mean))
+  text += fmt::format(
+      "\nno other way to draw is both cheaper and nearer by {:g} dE00 than one of these:",
+      quality::kLeastGain);
+  for (const std::size_t i : quality::pareto_front(trade.points, &quality::TradePoint::ms_median))
     text += "\n  " + in_words(trade.points[i]);
+  if (const auto idle = std::ranges::count_if(trade.points, &quality::TradePoint::has_idle_cache))
+    text += fmt::format(
+        "\n{} with the angular cache are not among them: in this scene under 1 % of the surface is "
+        "drawn from it",
+        idle);
   return text;
 }
 
@@ -120,7 +133,8 @@ Result<int> trade(const TradeRequest& request, CommandLine& line) {
   }
   line.print(trade_json(trade, about), text);
   if (!request.has_budget() || chosen) return kExitDone;
-  line.note(chosen.error().what);
+  // Not a note: whoever asked for quiet still has to be told why nothing was chosen.
+  fmt::print(stderr, "{}\n", chosen.error().what);
   return kExitGateMissed;
 }
 

@@ -50,6 +50,7 @@ constexpr std::array kFigures{
     Figure{"received_de00_mean", &TradePoint::received_de00_mean},
     Figure{"received_de00_p95", &TradePoint::received_de00_p95},
     Figure{"received_de00_max", &TradePoint::received_de00_max},
+    Figure{"cache_served", &TradePoint::cache_served},
 };
 
 ordered_json number_or_null(double value) {
@@ -74,7 +75,7 @@ ordered_json options_json(const quality::Candidate& candidate) {
 }
 
 std::set<std::size_t> front(const quality::Trade& trade, double TradePoint::*cost) {
-  const auto points = quality::pareto_front(trade.points, cost, &TradePoint::received_de00_mean);
+  const auto points = quality::pareto_front(trade.points, cost);
   return {points.begin(), points.end()};
 }
 
@@ -168,7 +169,8 @@ ordered_json trade_json(const quality::Trade& trade, const TradeAbout& about) {
                     {"clock", trade.clock},
                     {"machine", trade.machine},
                     {"date", trade.date},
-                    {"plain_ms", number_or_null(trade.plain_ms)}};
+                    {"plain_ms", number_or_null(trade.plain_ms)},
+                    {"least_gain_de00", quality::kLeastGain}};
   const std::set<std::size_t> by_time = front(trade, &TradePoint::ms_median);
   const std::set<std::size_t> by_bytes = front(trade, &TradePoint::gpu_bytes);
   ordered_json& candidates = json["candidates"] = ordered_json::array();
@@ -180,6 +182,7 @@ ordered_json trade_json(const quality::Trade& trade, const TradeAbout& about) {
                        {"options", options_json(point.candidate)},
                        {"fetches", point.fetches}};
     for (const Figure& figure : kFigures) entry[figure.name] = number_or_null(point.*figure.value);
+    entry["idle_cache"] = point.has_idle_cache();
     entry["pareto"] = by_time.contains(i);
     entry["pareto_bytes"] = by_bytes.contains(i);
     candidates.push_back(std::move(entry));

@@ -100,6 +100,20 @@ TEST(TradeJson, HoldsWhatWasMeasuredAndMarksTheFront) {
   EXPECT_EQ(report["left_out"][0]["why"], "too many");
 }
 
+TEST(TradeJson, KeepsACacheThatServesNothingOffTheFronts) {
+  quality::Trade trade = example();
+  quality::TradePoint& best = trade.points[3];  // an lpca
+  best.candidate.drawing.cache.spacing = 16;
+  for (const double served : {0.5, 0.0}) {
+    best.cache_served = served;
+    const json entry = json::parse(trade_json(trade, about()).dump())["candidates"][3];
+    EXPECT_EQ(entry["cache_served"], served);
+    EXPECT_EQ(entry["idle_cache"], served == 0.0);
+    EXPECT_EQ(entry["pareto"], served > 0.0);
+    EXPECT_EQ(entry["pareto_bytes"], served > 0.0);
+  }
+}
+
 TEST(TradeCsv, HasAFieldForEachColumnInEachLine) {
   std::istringstream lines(trade_csv(example()));
   std::string line;

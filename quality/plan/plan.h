@@ -13,6 +13,7 @@
 #include "btf/sample_set.h"
 #include "calibration/profile.h"
 #include "quality/reach.h"
+#include "quality/screen_reference.h"
 #include "quality/visible_difference.h"
 #include "render/scene.h"
 
@@ -32,6 +33,12 @@ struct PlanOptions {
   [[nodiscard]] Status check() const;
 };
 
+/// How far a fit is from the full BTF on the projector's raster.
+struct OnScreen {
+  ScreenErrors centre;    ///< each pixel shows the texel at its centre
+  ScreenErrors averaged;  ///< each pixel shows the mean of the texels under it
+};
+
 /// A fit and how it does in the scene.
 struct PlannedFit {
   std::string model;
@@ -43,7 +50,8 @@ struct PlannedFit {
   int fetches = 0;                                ///< of a pixel and light
   double bytes = 0;                               ///< on the GPU
   double fit_seconds = 0;
-  std::optional<double> frame_ms;  ///< of the draw pass, where it was measured
+  std::optional<double> frame_ms;     ///< of the draw pass, where it was measured
+  std::optional<OnScreen> on_screen;  ///< where it was measured: measure_plan_on_screen()
 
   /// "texel-colours 3+1, 32 clusters, 16 nodes"
   [[nodiscard]] std::string name() const;

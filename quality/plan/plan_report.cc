@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "base/files.h"
 #include "base/report_page.h"
@@ -32,6 +33,19 @@ ordered_json json_of(const VisibleDifference& d) {
           {"rmse", d.rmse}};
 }
 
+ordered_json json_of(const ScreenError& e) {
+  return {{"epsilon", e.epsilon},
+          {"rmse", e.rmse},
+          {"de00_mean", e.de00_mean},
+          {"de00_p95", e.de00_p95},
+          {"de00_max", e.de00_max},
+          {"pixels", e.pixels}};
+}
+
+ordered_json json_of(const ScreenErrors& e) {
+  return {{"target", json_of(e.target)}, {"received", json_of(e.received)}};
+}
+
 ordered_json json_of(const btf::DirectionBox& box) {
   return {{"u", {box.u_min, box.u_max}}, {"v", {box.v_min, box.v_max}}};
 }
@@ -48,11 +62,20 @@ ordered_json json_of(const PlannedFit& fit) {
                     {"set_rmse", fit.set_rmse},
                     {"difference", json_of(fit.difference)}};
   if (fit.frame_ms) json["frame_ms"] = *fit.frame_ms;
+  if (fit.on_screen)
+    json["on_screen"] = {{"centre", json_of(fit.on_screen->centre)},
+                         {"averaged", json_of(fit.on_screen->averaged)}};
   return json;
 }
 
 // A ratio whose divisor may be nothing at all.
 double over(double part, double whole) { return whole > 0 ? part / whole : 0; }
+
+// As asked for, a pixel the mean of its texels: of the fits themselves.
+std::optional<double> screen_rmse_ratio(const PlannedFit& general, const PlannedFit& chosen) {
+  if (!general.on_screen || !chosen.on_screen) return std::nullopt;
+  return over(chosen.on_screen->averaged.target.rmse, general.on_screen->averaged.target.rmse);
+}
 
 ordered_json compared_json(const PlannedFit& general, const PlannedFit& chosen) {
   ordered_json json = json_of(general);
@@ -60,29 +83,57 @@ ordered_json compared_json(const PlannedFit& general, const PlannedFit& chosen) 
   json["bytes_ratio"] = over(chosen.bytes, general.bytes);
   json["set_rmse_ratio"] = over(chosen.set_rmse, general.set_rmse);
   json["rmse_ratio"] = over(chosen.difference.rmse, general.difference.rmse);
+  if (const auto ratio = screen_rmse_ratio(general, chosen)) json["screen_rmse_ratio"] = *ratio;
   return json;
 }
 
 std::string megabytes(double bytes) { return fmt::format("{:.3f} MB", bytes / 1e6); }
 
+std::string screen_text(const ScreenError& e) {
+  return fmt::format("mean {:.2f}, 95 % {:.2f}, most {:.2f} dE00, eps {:.4f}, rmse {:.4f}",
+                     e.de00_mean,
+                     e.de00_p95,
+                     e.de00_max,
+                     e.epsilon,
+                     e.rmse);
+}
+
+std::string screen_text(const PlannedFit& fit) {
+  if (!fit.on_screen) return "";
+  std::string text;
+  for (const auto& [how, errors] :
+       {std::pair<const char*, const ScreenErrors&>{"a pixel's texel", fit.on_screen->centre},
+        {"a pixel's mean", fit.on_screen->averaged}})
+    text += fmt::format("  on the screen, {}: asked for {}; received {}\n",
+                        how,
+                        screen_text(errors.target),
+                        screen_text(errors.received));
+  return text;
+}
+
 std::string compared_text(std::string_view what,
                           const PlannedFit& general,
                           const PlannedFit& chosen) {
-  return fmt::format(
-      "{}: {}: {} fetches, {}, mean {:.2f} dE00, rmse {:.4f} drawn, {:.4f} in the set\n"
-      "  so the plan takes {:.2f} of its fetches, {:.4f} of its bytes, and has {:.2f} of its rmse "
-      "drawn, {:.2f} in the set\n",
+  std::string text = fmt::format(
+      "{}: {}: {} fetches, {}, mean {:.2f} dE00, rmse {:.4f} drawn, {:.4f} in the set\n",
       what,
       general.name(),
       general.fetches,
       megabytes(general.bytes),
       general.difference.de00_mean,
       general.difference.rmse,
-      general.set_rmse,
+      general.set_rmse);
+  text += screen_text(general);
+  text += fmt::format(
+      "  so the plan takes {:.2f} of its fetches, {:.4f} of its bytes, and has {:.2f} of its rmse "
+      "drawn, {:.2f} in the set",
       over(chosen.fetches, general.fetches),
       over(chosen.bytes, general.bytes),
       over(chosen.difference.rmse, general.difference.rmse),
       over(chosen.set_rmse, general.set_rmse));
+  if (const auto ratio = screen_rmse_ratio(general, chosen))
+    text += fmt::format(", {:.2f} on the screen", *ratio);
+  return text + "\n";
 }
 
 std::string mip_advice(const Reach& reach) {
@@ -213,6 +264,7 @@ std::string plan_text(const Plan& plan) {
       chosen.difference.rmse,
       chosen.set_rmse,
       plan.is_invisible ? "" : "; its error is seen, nothing better was found");
+  text += screen_text(chosen);
   if (plan.general) text += compared_text("fitted for any scene", *plan.general, chosen);
   if (plan.general_alike && plan.general_alike->options.components != chosen.options.components)
     text += compared_text(plan.general_alike->difference.rmse <= chosen.difference.rmse

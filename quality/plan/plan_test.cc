@@ -7,7 +7,9 @@
 #include "base/files.h"
 #include "base/testing/temporary_folder.h"
 #include "btf/internal_test_sets.h"
+#include "btf/interpolated_set.h"
 #include "quality/internal_test_scenes.h"
+#include "quality/plan/on_screen.h"
 #include "quality/plan/plan_report.h"
 
 namespace veneer::quality {
@@ -113,6 +115,13 @@ TEST_F(Planned, DropsTheSpecularTermOfAMatteMaterial) {
   ASSERT_TRUE(without) << without.error().what;
   ASSERT_EQ(without->dropped.size(), 1);
   EXPECT_FALSE(without->chosen.material->has_specular_term());
+  const auto step = std::ranges::find_if(
+      without->steps, [](const PlanStep& s) { return s.what.starts_with("leave out"); });
+  ASSERT_NE(step, without->steps.end());
+  EXPECT_TRUE(step->taken);
+  EXPECT_TRUE(step->difference.de00_max < 0.5 || step->difference.codes_max < 1);
+  EXPECT_NE(without->dropped.front().find("it saves 2 of 8 fetches"), std::string::npos)
+      << without->dropped.front();
   EXPECT_TRUE(without->is_invisible);
   const btf::SampleSet glossy = made_set(folder_.path() / "glossy", true, 0.5);
   const auto with = plan(glossy, plate(-30, 30, 1), options);
@@ -205,6 +214,45 @@ TEST_F(Planned, TellsWhatItFoundInTextNumbersAndAPage) {
   ASSERT_TRUE(file);
   EXPECT_EQ(file->metadata().at("planned_for"), "a scene");
   EXPECT_EQ(file->metadata().at("planned_region"), region_in_words(made->reach));
+}
+
+// Two ways to the same figure: what is asked, in double precision on the CPU, and what the GPU
+// drew, read back from the raster. They sample the region at other places, so they agree to a few
+// parts in ten of what is seen, and never order two fits otherwise where those are far apart.
+TEST_F(Planned, DrawsOnTheScreenAboutTheErrorThatItForesaw) {
+  const btf::SampleSet set = made_set(folder_.path(), false, 0.5);
+  PlanOptions options;
+  options.models = {"revised-lpca"};
+  options.max_de00 = 0.3;
+  const render::Scene scene = plate(-30, 30, 1);
+  auto made = plan(set, scene, options);
+  ASSERT_TRUE(made) << made.error().what;
+  EXPECT_FALSE(made->chosen.on_screen);
+  const PlanSource source{"a set", "a scene", "a profile"};
+  EXPECT_FALSE(plan_json(*made, source)["chosen"].contains("on_screen"));
+  EXPECT_EQ(plan_text(*made).find("on the screen"), std::string::npos);
+  SilentProgress silent;
+  const btf::InterpolatedSet full(set);
+  const Status measured = measure_plan_on_screen(*made, full, scene, front_projector(), silent);
+  ASSERT_TRUE(measured) << measured.error().what;
+  for (const PlannedFit* fit : {&made->chosen, &*made->general, &*made->general_alike}) {
+    ASSERT_TRUE(fit->on_screen) << fit->name();
+    const double foreseen = fit->difference.de00_mean;
+    const OnScreen& seen = *fit->on_screen;
+    EXPECT_NEAR(seen.averaged.target.de00_mean, foreseen, 0.3 * foreseen + 0.02) << fit->name();
+    // Pixels are much narrower than texels here: what lies between texels neither adds nor takes.
+    EXPECT_NEAR(seen.averaged.target.rmse, seen.centre.target.rmse, 0.01 * seen.centre.target.rmse)
+        << fit->name();
+    EXPECT_GT(seen.averaged.received.de00_mean, 0) << fit->name();
+    EXPECT_EQ(seen.centre.target.pixels, seen.averaged.received.pixels);
+  }
+  const nlohmann::ordered_json json = plan_json(*made, source);
+  for (const char* which : {"chosen", "general", "general_alike"})
+    EXPECT_GT(json[which]["on_screen"]["averaged"]["received"]["de00_mean"], 0) << which;
+  EXPECT_EQ(json["general"]["screen_rmse_ratio"],
+            made->chosen.on_screen->averaged.target.rmse /
+                made->general->on_screen->averaged.target.rmse);
+  EXPECT_NE(plan_text(*made).find("on the screen, a pixel's mean"), std::string::npos);
 }
 
 TEST_F(Planned, RefusesWhatCannotBePlanned) {

@@ -7,6 +7,7 @@
 #include "btf/importers/importer.h"
 #include "btf/interpolated_set.h"
 #include "quality/internal_test_scenes.h"
+#include "quality/plan/on_screen.h"
 #include "quality/reach.h"
 #include "quality/visible_difference.h"
 
@@ -15,6 +16,7 @@ namespace veneer::quality {
 namespace {
 
 struct Fitted {
+  std::shared_ptr<const btf::Material> material;
   double set_rmse;
   double drawn_rmse;
   int fetches;
@@ -40,7 +42,7 @@ class RealPlan : public ::testing::Test {
   Fitted fit(const btf::FitOptions& options,
              const Reach& reach,
              const VisibleDifferences& from_full) {
-    const auto material = (*btf::find_model("revised-lpca"))->fit(*set_, options, silent_);
+    auto material = (*btf::find_model("revised-lpca"))->fit(*set_, options, silent_);
     EXPECT_TRUE(material) << material.error().what;
     const btf::Material& m = **material;
     const btf::ModelShader shader = m.shader();
@@ -48,7 +50,9 @@ class RealPlan : public ::testing::Test {
         from_full.of([&m](int t, const btf::Direction& v, const btf::Direction& l) {
           return m.radiance(t, v, l);
         });
-    return {*weighted_rmse(*set_, m, reach.region.weights),
+    const double set_rmse = *weighted_rmse(*set_, m, reach.region.weights);
+    return {std::move(*material),
+            set_rmse,
             difference.rmse,
             shader.fetches,
             static_cast<double>(shader.gpu_bytes())};
@@ -100,6 +104,32 @@ TEST_F(RealPlan, HasLessErrorThanTheGeneralFitAndCostsLessAtEqualError) {
   EXPECT_LE(planned2.drawn_rmse, general8.drawn_rmse);
   EXPECT_LE(3 * planned2.fetches, general8.fetches);
   EXPECT_LE(10 * planned2.bytes, general8.bytes);
+
+  // On the raster, by the GPU.
+  Plan drawn;
+  drawn.chosen.material = planned4.material;
+  drawn.general.emplace().material = general4.material;
+  const Status measured = measure_plan_on_screen(drawn, full, scene, profile, silent_);
+  ASSERT_TRUE(measured) << measured.error().what;
+  const ScreenErrors& planned = drawn.chosen.on_screen->averaged;
+  const ScreenErrors& general = drawn.general->on_screen->averaged;
+  for (const auto& [name, e] : {std::pair{"general 4", general}, std::pair{"planned 4", planned}})
+    std::printf(
+        "%s on the screen: asked for mean %.2f, 95 %% %.2f, most %.2f dE00, eps %.4f, rmse %.4f; "
+        "received mean %.2f, 95 %% %.2f, most %.2f dE00, eps %.4f, rmse %.4f\n",
+        name,
+        e.target.de00_mean,
+        e.target.de00_p95,
+        e.target.de00_max,
+        e.target.epsilon,
+        e.target.rmse,
+        e.received.de00_mean,
+        e.received.de00_p95,
+        e.received.de00_max,
+        e.received.epsilon,
+        e.received.rmse);
+  EXPECT_LE(planned.target.rmse, 0.6 * general.target.rmse);
+  EXPECT_LE(planned.received.rmse, 0.6 * general.received.rmse);
 }
 
 }  // namespace

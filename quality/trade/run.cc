@@ -280,6 +280,7 @@ class Runner {
       point.ms_p95 = figure(*found, "ms_p95");
       point.ratio = figure(*found, "ratio");
       point.gpu_bytes = figure(*found, "gpu_bytes");
+      point.cache_served = figure(*found, "cache_served");
     }
     trade_.renderer = text_of(timing, "renderer");
     trade_.clock = text_of(timing, "clock");
@@ -313,6 +314,7 @@ class Runner {
                                                     {"ms_p95", t.ms_p95},
                                                     {"ratio", t.ratio},
                                                     {"gpu_bytes", t.gpu_bytes}};
+        if (t.served) points[trade_.points[i].candidate.key()]["cache_served"] = *t.served;
       }
       timing["renderer"] = result.renderer;
       timing["clock"] = result.clock;

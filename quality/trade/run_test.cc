@@ -8,6 +8,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
+#include <cmath>
 #include <map>
 
 #include "base/files.h"
@@ -76,12 +78,14 @@ struct World {
       result.timings.push_back({.name = "plain", .ms_median = load, .ratio = 1});
       for (const render::NamedLevel& level : levels) {
         const double ratio = 1 + 10 * level.level.drawing.scale;
-        result.timings.push_back({.name = level.name,
-                                  .ms_median = load * ratio,
-                                  .ms_p95 = 2 * load * ratio,
-                                  .ratio = ratio,
-                                  .fetches = 3,
-                                  .gpu_bytes = 1000});
+        result.timings.push_back(
+            {.name = level.name,
+             .ms_median = load * ratio,
+             .ms_p95 = 2 * load * ratio,
+             .ratio = ratio,
+             .fetches = 3,
+             .gpu_bytes = 1000,
+             .served = level.level.drawing.cache.spacing > 0 ? std::optional(0.25) : std::nullopt});
       }
       return result;
     };
@@ -182,6 +186,23 @@ TEST_F(TradeRunTest, MeasuresEveryCandidateAndFitsEachFitOnce) {
   }
   EXPECT_EQ(trade->renderer, "a renderer");
   EXPECT_EQ(trade->clock, "a clock");
+}
+
+TEST_F(TradeRunTest, NotesWhatTheCacheServesAndKeepsIt) {
+  Candidate plain{"lpca", {}, {}};
+  plain.fit.components = "2";
+  plain.fit.clusters = 1;
+  Candidate cached = plain;
+  cached.drawing.cache.spacing = 16;
+  for (int time = 0; time < 2; ++time) {  // measured, then from the journal
+    World world(folder_.path() / std::to_string(time));
+    SilentProgress progress;
+    const auto trade = run_trade(options(), std::array{plain, cached}, world.tools(), progress);
+    ASSERT_TRUE(trade) << trade.error().what;
+    EXPECT_EQ(world.timings, time == 0 ? 1 : 0);
+    EXPECT_TRUE(std::isnan(trade->points[0].cache_served));
+    EXPECT_EQ(trade->points[1].cache_served, 0.25);
+  }
 }
 
 // Wherever it is stopped: what was done is not done again, and the result is the same.

@@ -13,6 +13,7 @@ namespace veneer::simulation {
 [[nodiscard]] HeightField make_corrugated_print(int size, std::uint64_t seed);
 [[nodiscard]] HeightField make_hammered(int size, std::uint64_t seed);
 [[nodiscard]] HeightField make_leather(int size, std::uint64_t seed);
+[[nodiscard]] HeightField make_plaster(int size, std::uint64_t seed);
 
 /// Samples a material given as functions of the place (x, y) in tile widths, y downwards.
 /// @param height_at  double(x, y), tile widths; asked at the cells' corners

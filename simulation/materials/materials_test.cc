@@ -23,7 +23,7 @@ TEST(Materials, AreFoundByNameAndOthersAreNot) {
   ASSERT_FALSE(none.has_value());
   EXPECT_EQ(none.error().code, Errc::kInvalidOption);
   EXPECT_THAT(none.error().what,
-              testing::HasSubstr("cloth, corrugated, corrugated-print, hammered, leather"));
+              testing::HasSubstr("cloth, corrugated, corrugated-print, hammered, leather, plaster"));
 }
 
 TEST(Materials, AreValidAtEverySize) {

@@ -26,6 +26,7 @@ constexpr std::array kMaterials{
     HeightFieldMaterial{
         "hammered", "hammered copper: tinted gloss, hardly any body colour", &make_hammered},
     HeightFieldMaterial{"leather", "pressed brown leather under a clear coat", &make_leather},
+    HeightFieldMaterial{"plaster", "dry lime plaster, matte", &make_plaster},
 };
 static_assert(std::ranges::is_sorted(kMaterials, {}, &HeightFieldMaterial::name));
 
