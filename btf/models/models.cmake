@@ -16,6 +16,9 @@ set(VENEER_MODEL_SRCS
   models/fitted_pairs.cc
   models/half_angle.cc
   models/lafortune/lafortune.cc
+  models/layered/layer_fit.cc
+  models/layered/layer_stack.cc
+  models/layered/layered.cc
   models/lobes/lafortune_lobes.cc
   models/lobes/lobe_fit.cc
   models/local_pca.cc
@@ -59,6 +62,7 @@ set(VENEER_MODEL_SHADERS
   models/elevated_concentric.glsl
   models/half_angle.glsl
   models/lafortune/lafortune.glsl
+  models/layered/layered.glsl
   models/lobes/lafortune_lobes.glsl
   models/lobes/lobes.glsl
   models/lpca/lpca.glsl
