@@ -96,6 +96,23 @@ TEST(SampleSet, TotalOfAPolarisedSetIsTheSumOfItsParts) {
   EXPECT_EQ(diffuse[3], pattern(4, 0, 1, 3));
 }
 
+TEST(SampleSet, ChosenPairsAreThoseOfTheWholeAtAnyScale) {
+  for (const bool polarised : {false, true}) {
+    const TemporaryFolder folder;
+    const SampleSet set =
+        testing::make_set(folder.path() / "a.btfset", small_info(polarised), pattern)
+            .with_scale(0.25);
+    std::vector<float> all(3 * static_cast<std::size_t>(set.info().pair_count()));
+    std::vector<float> some(6);
+    set.rgb(4, Part::kTotal, all);
+    set.rgb(4, Part::kTotal, std::array{1, 4}, some);
+    for (std::size_t c = 0; c < 3; ++c) {
+      EXPECT_EQ(some[c], all[3 + c]);
+      EXPECT_EQ(some[3 + c], all[12 + c]);
+    }
+  }
+}
+
 TEST(SampleSet, CheckFiniteNamesTheFirstBadSample) {
   const TemporaryFolder folder;
   const SampleSet set =
