@@ -23,8 +23,12 @@ constexpr int kSweeps = 9;
 constexpr int kSweepsWithoutShadows = 3;
 // Steps of the solver in one pass over the views.
 constexpr int kSteps = 8;
-// Passes behind it that take all views before their one step.
-constexpr int kWholePasses = 2;
+// Passes behind it, at most, that take all views before their one step; and when they end.
+constexpr int kWholePasses = 3;
+constexpr double kConverged = 0.999;
+constexpr double kNextToNothing = 0.01;
+// Views that a sweep looks at, at least; the last two sweeps look at all.
+constexpr int kLeastViews = 32;
 // Sweeps in which every point's lobe is also looked for from the start, since some end in a narrow
 // one.
 constexpr bool looks_again(int sweep) { return sweep == 3 || sweep == 5; }
@@ -49,7 +53,7 @@ struct Blend {
 class PointFit {
  public:
   PointFit(const LayerViews& stack, std::span<const int> order)
-      : stack_(stack), order_(order), views_(order.size()) {}
+      : stack_(stack), order_(order), views_(stack.view_count()) {}
 
   struct Outcome {
     LayerPoint point;
@@ -59,7 +63,7 @@ class PointFit {
 
   // @param forgetting  where it begins; it rises to 1 over the passes.
   [[nodiscard]] Outcome fit(int layer, int texel, double forgetting, bool again) {
-    stack_.look(layer, texel, views_);
+    stack_.look(layer, texel, order_, views_);
     const LayerPoint before = stack_.points(layer)[static_cast<std::size_t>(texel)];
     shade_ = stack_.arriving(layer, texel);
     with_radiance_ = layer > 0 && shade_.minCoeff() < 1.0F;
@@ -70,31 +74,35 @@ class PointFit {
 
     const bool lowest = layer == stack_.layer_count() - 1;
     const bool known = before.diffuse.maxCoeff() > 0.0F && before.transmittance < 0.9F;
-    LayerPoint candidate = known ? before : start_of(views_, shade_, stack_.lights());
-    candidate.diffuse_radiance = before.diffuse_radiance;
-    candidate.transmittance = 0.0F;
-    bool held = solve(candidate, forgetting);
-    if (!known) held = solve(candidate, 1.0) && held;
-    Outcome best{candidate, blend_of(candidate).error(1.0, 0.0), !held};
-    if (!lowest) best = blended(candidate, best);
+    LayerPoint point = known ? before : start_of(views_, order_, shade_, stack_.lights());
+    point.diffuse_radiance = before.diffuse_radiance;
+    point.transmittance = 0.0F;
+    Outcome best = solved(point, forgetting);
+    if (!known) best = solved(best.point, 1.0);
+    if (!lowest) best = blended(best);
     if (again) best = with_fresh_lobe(best);
     if (!(best.error < error_before * (1.0 + 1e-6))) {
       // Where the neighbours have moved, what was there before may fit better than a new answer.
-      best.point = before;
-      best.error = error_before;
+      best = {before, error_before, best.fell_back};
     }
     return best;
   }
 
  private:
-  bool solve(LayerPoint& point, double forgetting) {
-    const bool held = pass(point, forgetting, kSteps);
-    for (int i = 0; i < kWholePasses; ++i) pass(point, 1.0, 1);
-    return held;
+  // The point that the views lead to from another; its transmittance stays.
+  [[nodiscard]] Outcome solved(const LayerPoint& from, double forgetting) {
+    Outcome best{from, blend_of(from).error(1.0, from.transmittance), false};
+    best.fell_back = !pass(best, forgetting, kSteps);
+    for (int i = 0; i < kWholePasses; ++i) {
+      const double before = best.error;
+      pass(best, 1.0, 1);
+      if (best.error > kConverged * before) break;
+    }
+    return best;
   }
-  // Refines a point; false where a step failed and it stayed where it was.
-  bool pass(LayerPoint& point, double forgetting, int steps) {
-    PointSolver solver(point, with_radiance_);
+  // False where no step held.
+  bool pass(Outcome& best, double forgetting, int steps) {
+    PointSolver solver(best.point, with_radiance_);
     const std::size_t chunk =
         std::max<std::size_t>(1, order_.size() / static_cast<std::size_t>(steps));
     std::size_t taken = 0;
@@ -106,16 +114,18 @@ class PointFit {
       const double done = static_cast<double>(taken) / static_cast<double>(order_.size());
       moved = solver.step(forgetting + (1.0 - forgetting) * done) || moved;
     }
-    const LayerPoint next = solver.point();
-    const double share = point.transmittance;
-    if (moved && blend_of(next).error(1.0, share) <= blend_of(point).error(1.0, share))
-      point = next;
-    return moved;
+    if (!moved) return false;
+    const double error = blend_of(solver.point()).error(1.0, solver.point().transmittance);
+    if (error < best.error) {
+      best.point = solver.point();
+      best.error = error;
+    }
+    return true;
   }
 
   // Eq. (13): how much of the candidate and how much of what lies below; then the layer again.
-  Outcome blended(const LayerPoint& candidate, const Outcome& opaque) {
-    const Blend blend = blend_of(candidate);
+  [[nodiscard]] Outcome blended(const Outcome& opaque) {
+    const Blend blend = blend_of(opaque.point);
     const double clear_error = blend.error(0.0, 1.0);
     double of_layer = 1.0;
     double of_below = 0.0;
@@ -125,13 +135,16 @@ class PointFit {
       of_below = std::clamp((blend.ll * blend.br - blend.lb * blend.lr) / determinant, 0.0, 1.0);
       of_layer = std::max(0.0, (blend.lr - of_below * blend.lb) / blend.ll);
     }
-    LayerPoint mixed = candidate;
-    mixed.transmittance = static_cast<float>(of_below);
-    mixed.diffuse *= static_cast<float>(of_layer);
-    mixed.specular *= static_cast<float>(of_layer);
-    const bool held = solve(mixed, 1.0);
-    Outcome best{mixed, blend_of(mixed).error(1.0, mixed.transmittance), !held};
-    if (opaque.error <= kSimplerAt * best.error) best = opaque;
+    Outcome best = opaque;
+    // The rest is the same layer again where next to nothing comes from below.
+    if (of_below > kNextToNothing) {
+      LayerPoint mixed = opaque.point;
+      mixed.transmittance = static_cast<float>(of_below);
+      mixed.diffuse *= static_cast<float>(of_layer);
+      mixed.specular *= static_cast<float>(of_layer);
+      const Outcome through = solved(mixed, 1.0);
+      if (opaque.error > kSimplerAt * through.error) best = through;
+    }
     if (clear_error <= kSimplerAt * best.error) best = {LayerPoint{}, clear_error, false};
     return best;
   }
@@ -139,13 +152,12 @@ class PointFit {
   [[nodiscard]] Outcome with_fresh_lobe(const Outcome& known) {
     if (!(known.point.diffuse.maxCoeff() > 0.0F)) return known;
     LayerPoint point = known.point;
-    const LayerPoint fresh = start_of(views_, shade_, stack_.lights());
+    const LayerPoint fresh = start_of(views_, order_, shade_, stack_.lights());
     point.specular = fresh.specular;
     point.exponent = fresh.exponent;
     point.lobe = fresh.lobe;
-    const bool held = solve(point, kLeastForgetting);
-    const double error = blend_of(point).error(1.0, point.transmittance);
-    return error < known.error ? Outcome{point, error, !held} : known;
+    const Outcome found = solved(point, kLeastForgetting);
+    return found.error < known.error ? found : known;
   }
 
   // What a point sends.
@@ -161,7 +173,8 @@ class PointFit {
 
   [[nodiscard]] Blend blend_of(const LayerPoint& point) {
     Blend blend;
-    for (const PointView& view : views_) {
+    for (const int v : order_) {
+      const PointView& view = views_[static_cast<std::size_t>(v)];
       if (!(view.visible > 0.0F)) continue;
       LightRows sent = sent_by(point, view) * view.visible;
       LightRows below = view.below * view.visible;
@@ -237,7 +250,7 @@ Result<LayerFit> fit_layers(const SampleSet& set,
   VENEER_ASSIGN(const std::vector<float> heights, layer_heights(set, pairs, options, progress));
   LayerViews stack(set, pairs, heights);
   const int layers = stack.layer_count();
-  const std::vector<int> order = mixed_order(static_cast<int>(frame.views.size()), options.seed);
+  std::vector<int> order = mixed_order(static_cast<int>(frame.views.size()), options.seed);
   const int sweeps = layers == 1 ? 2 : kSweeps;
   int fallbacks = 0;
   progress.start("layers", std::int64_t{sweeps} * layers * frame.texel_count());
@@ -246,10 +259,17 @@ Result<LayerFit> fit_layers(const SampleSet& set,
     const double forgetting =
         kLeastForgetting + (1.0 - kLeastForgetting) * sweep / std::max(1, sweeps - 1);
     std::atomic<int> fell_back = 0;
+    // Others each time, so that all are heard.
+    const std::size_t looked_at =
+        sweep + 2 < sweeps
+            ? std::min(order.size(), std::max<std::size_t>(kLeastViews, order.size() / 2))
+            : order.size();
+    std::ranges::rotate(order,
+                        order.begin() + static_cast<std::ptrdiff_t>(looked_at % order.size()));
     for (int layer = layers - 1; layer >= 0; --layer) {
       std::vector<LayerPoint> points = stack.points(layer);
       parallel_for(frame.texel_count(), kGrain, [&](std::int64_t begin, std::int64_t end) {
-        PointFit fit(stack, order);
+        PointFit fit(stack, std::span(order).first(looked_at));
         for (auto texel = static_cast<int>(begin); texel < end; ++texel) {
           const PointFit::Outcome outcome = fit.fit(layer, texel, forgetting, looks_again(sweep));
           points[static_cast<std::size_t>(texel)] = outcome.point;

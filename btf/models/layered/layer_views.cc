@@ -137,9 +137,13 @@ void LayerViews::read(int texel, std::size_t view, LightRows& rows) const {
           .transpose();
 }
 
-void LayerViews::look(int layer, int texel, std::vector<PointView>& views) const {
+void LayerViews::look(int layer,
+                      int texel,
+                      std::span<const int> order,
+                      std::vector<PointView>& views) const {
   const auto lights = static_cast<std::size_t>(lights_.rows());
-  for (std::size_t v = 0; v < frame_.views.size(); ++v) {
+  for (const int number : order) {
+    const auto v = static_cast<std::size_t>(number);
     PointView& view = views[v];
     const int base = moved(texel, -view_steps_[static_cast<std::size_t>(layer)][v]);
     read(base, v, view.wanted);

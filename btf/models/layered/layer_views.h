@@ -23,6 +23,7 @@ class LayerViews {
 
   [[nodiscard]] int layer_count() const { return static_cast<int>(points_.size()); }
   [[nodiscard]] int texel_count() const { return frame_.texel_count(); }
+  [[nodiscard]] std::size_t view_count() const { return u_.size(); }
   [[nodiscard]] const Eigen::ArrayX3f& lights() const { return lights_; }
   [[nodiscard]] const std::vector<LayerPoint>& points(int layer) const {
     return points_[static_cast<std::size_t>(layer)];
@@ -40,8 +41,9 @@ class LayerViews {
 
   /// S of each light at a point.
   [[nodiscard]] Eigen::ArrayXf arriving(int layer, int texel) const;
-  /// What every view says of a point. @param views  as many as the frame has; filled.
-  void look(int layer, int texel, std::vector<PointView>& views) const;
+  /// What some views say of a point. @param order  which. @param views  view_count(); those of
+  /// order are filled.
+  void look(int layer, int texel, std::span<const int> order, std::vector<PointView>& views) const;
   [[nodiscard]] LayerStack stack() const;
 
  private:

@@ -129,12 +129,14 @@ bool PointSolver::step(double forgetting) {
 }
 
 LayerPoint start_of(std::span<const PointView> views,
+                    std::span<const int> order,
                     const Eigen::ArrayXf& arrived,
                     const Eigen::ArrayX3f& lights) {
   const Eigen::ArrayXf cosine = lights.col(2) * arrived;
   Eigen::Vector3d above = Eigen::Vector3d::Zero();
   double below = 0.0;
-  for (const PointView& view : views) {
+  for (const int v : order) {
+    const PointView& view = views[static_cast<std::size_t>(v)];
     const Eigen::ArrayXf weighted =
         view.weight.size() > 0 ? Eigen::ArrayXf(cosine * view.weight) : cosine;
     above += double(view.visible) *

@@ -54,7 +54,9 @@ class PointSolver {
 };
 
 /// A wide start for lobes and normal whose colour suits what is wanted.
+/// @param order  which of the views
 [[nodiscard]] LayerPoint start_of(std::span<const PointView> views,
+                                  std::span<const int> order,
                                   const Eigen::ArrayXf& arrived,
                                   const Eigen::ArrayX3f& lights);
 

@@ -17,6 +17,7 @@ struct Scene {
   Eigen::ArrayX3f lights;
   Eigen::ArrayXf shade;
   std::vector<PointView> views;
+  std::vector<int> order;
 };
 
 LightRows sent(const LayerPoint& point, const Scene& scene, const PointView& view) {
@@ -41,6 +42,7 @@ Scene scene_of(const LayerPoint& truth, std::uint64_t seed) {
   }
   for (int v = 0; v < 30; ++v) {
     PointView& view = scene.views.emplace_back();
+    scene.order.push_back(v);
     view.u =
         scene.lights.rowwise() * random_direction(random, 0.2).cast<float>().transpose().array();
     view.below.setZero(kLights, 3);
@@ -65,7 +67,7 @@ TEST(PointSolver, FindsColoursLobeNormalAndRadianceAgain) {
   truth.diffuse_radiance = 0.1F;
   truth.transmittance = 0.0F;
   const Scene scene = scene_of(truth, 3);
-  LayerPoint point = start_of(scene.views, scene.shade, scene.lights);
+  LayerPoint point = start_of(scene.views, scene.order, scene.shade, scene.lights);
   point.transmittance = 0.0F;
   const double before = error_of(point, scene);
   for (int pass = 0; pass < 6; ++pass) {
@@ -94,7 +96,7 @@ TEST(PointSolver, GivesFiniteNumbersForBlackAndForHugeSamples) {
     truth.diffuse.setConstant(level);
     truth.transmittance = 0.0F;
     const Scene scene = scene_of(truth, 5);
-    PointSolver solver(start_of(scene.views, scene.shade, scene.lights), true);
+    PointSolver solver(start_of(scene.views, scene.order, scene.shade, scene.lights), true);
     for (int pass = 0; pass < 4; ++pass) {
       for (const PointView& view : scene.views) solver.add(view, scene.shade, scene.lights);
       solver.step(0.95);
