@@ -10,6 +10,7 @@
 #include "btf/models/dichromatic_lpca/dichromatic_lpca.h"
 #include "btf/models/eigen_texture/eigen_texture.h"
 #include "btf/models/lafortune/lafortune.h"
+#include "btf/models/layered/layered.h"
 #include "btf/models/lpca/lpca.h"
 #include "btf/models/phong/phong.h"
 #include "btf/models/reflectance_field/reflectance_field.h"
@@ -76,6 +77,12 @@ constexpr std::array kModels{
           false,
           &fit_scaled<&fit_lafortune>,
           &load_scaled<&load_lafortune>},
+    Model{"layered",
+          "semi-transparent layers at several heights (Magda and Kriegman 2005)",
+          0,
+          false,
+          &fit_scaled<&fit_layered>,
+          &load_scaled<&load_layered>},
     Model{"lpca",
           "RGB Eigen-BRDFs of texel clusters, nine-fold interpolation (Mueller et al. 2003)",
           1,

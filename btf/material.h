@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -22,6 +23,13 @@
 namespace veneer::btf {
 
 struct FitRegion;
+
+/// Heights above the reference plane of a sample set, in texels. lowest < highest, unless there is
+/// one layer only.
+struct HeightRange {
+  double lowest = 0.0;
+  double highest = 0.0;
+};
 
 /// How to fit a model; each model reads what it knows and refuses what it cannot do.
 struct FitOptions {
@@ -40,6 +48,11 @@ struct FitOptions {
   /// Lobes of a texel, for models made of them. 1 to 4.
   int lobes = 2;
   static constexpr int kMostLobes = 4;
+  /// Layers of `layered`, up to LayerStack::kMostLayers; 0: as many as the data support.
+  int layers = 0;
+  /// Where its lowest and its highest layer lie, texels above the reference plane; empty: found
+  /// from the data.
+  std::optional<HeightRange> heights;
   /// How the GPU keeps what dominates a model's size, where it offers several: "8bit" or
   /// "float16"; empty takes the model's own choice (revised-lpca, eigen-texture: 8bit).
   std::string precision;

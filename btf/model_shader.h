@@ -62,6 +62,14 @@ struct EigenCache {
   int texel_fetches = 0;  ///< of one call of btf_radiance_cached(), without the layers'
 };
 
+/// A model whose texels lie in layers, which may also be drawn as shells around a mesh, one for
+/// each layer, so that the contour of the texture shows. The source then also defines `vec4
+/// btf_shell(int layer, vec2 uv, vec3 view, vec3 light)`: the radiance of the layer's texel at uv,
+/// without what lies above it, and in alpha how much it hides of what lies below, 0 to 1.
+struct ShellLayers {
+  std::vector<float> heights;  ///< above the surface, in texels, from the top
+};
+
 /// What the renderer needs to draw a material: GLSL that defines
 /// `vec3 btf_radiance(vec2 uv, vec3 view, vec3 light)` in the sample's unit, and its textures.
 /// `uv` is in repeats of the sample (uv.x = 1 is one width to the right), `view` and `light` are
@@ -76,8 +84,9 @@ struct EigenCache {
 struct ModelShader {
   std::string source;  ///< constants first, no #version
   std::vector<ModelTexture> textures;
-  int fetches = 0;                                 ///< texture fetches for one call
-  std::optional<EigenCache> cache = std::nullopt;  ///< for models that offer it
+  int fetches = 0;                                   ///< texture fetches for one call
+  std::optional<EigenCache> cache = std::nullopt;    ///< for models that offer it
+  std::optional<ShellLayers> shells = std::nullopt;  ///< for models that offer it
   [[nodiscard]] std::size_t gpu_bytes() const;
 };
 

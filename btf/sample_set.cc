@@ -268,13 +268,14 @@ void SampleSet::rgb(int texel, Part part, std::span<const int> pairs, std::span<
   VENEER_CHECK(info_->polarised || part == Part::kTotal);
   const std::span<const Eigen::half> samples = stored(texel);
   const auto channels = static_cast<std::size_t>(info_->channel_count());
+  const auto scale = static_cast<float>(info_->scale);
   auto to = out.begin();
   for (const int pair : pairs) {
     const auto from = samples.subspan(static_cast<std::size_t>(pair) * channels, channels);
     for (std::size_t c = 0; c < 3; ++c) {
       const auto first = static_cast<float>(from[part == Part::kDiffuse ? c + 3 : c]);
       const bool both = info_->polarised && part == Part::kTotal;
-      *to++ = both ? first + static_cast<float>(from[c + 3]) : first;
+      *to++ = scale * (both ? first + static_cast<float>(from[c + 3]) : first);
     }
   }
 }

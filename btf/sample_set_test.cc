@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <limits>
@@ -94,6 +95,23 @@ TEST(SampleSet, TotalOfAPolarisedSetIsTheSumOfItsParts) {
   for (std::size_t i = 0; i < 18; ++i) EXPECT_EQ(total[i], specular[i] + diffuse[i]);
   EXPECT_EQ(specular[3], pattern(4, 0, 1, 0));
   EXPECT_EQ(diffuse[3], pattern(4, 0, 1, 3));
+}
+
+TEST(SampleSet, ChosenPairsAreThoseOfTheWholeAtAnyScale) {
+  for (const bool polarised : {false, true}) {
+    const TemporaryFolder folder;
+    const SampleSet set =
+        testing::make_set(folder.path() / "a.btfset", small_info(polarised), pattern)
+            .with_scale(0.25);
+    std::vector<float> all(3 * static_cast<std::size_t>(set.info().pair_count()));
+    std::vector<float> some(6);
+    set.rgb(4, Part::kTotal, all);
+    set.rgb(4, Part::kTotal, std::array{1, 4}, some);
+    for (std::size_t c = 0; c < 3; ++c) {
+      EXPECT_EQ(some[c], all[3 + c]);
+      EXPECT_EQ(some[3 + c], all[12 + c]);
+    }
+  }
 }
 
 TEST(SampleSet, CheckFiniteNamesTheFirstBadSample) {

@@ -2,6 +2,7 @@
 #include "btf/models/fitted_pairs.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "btf/elevated_concentric.h"
 #include "btf/spherical_interpolation.h"
@@ -100,6 +101,13 @@ std::vector<float> FittedPairs::weights_everywhere() const {
 Eigen::ArrayXf FittedPairs::all_weights() const {
   if (weights_.empty()) return Eigen::ArrayXf::Ones(frame_.pair_count());
   return Eigen::Map<const Eigen::ArrayXf>(weights_.data(), frame_.pair_count());
+}
+
+std::vector<int> FittedPairs::numbers(const SampleSetInfo& info) const {
+  if (!pairs_.empty()) return pairs_;
+  std::vector<int> all(static_cast<std::size_t>(info.pair_count()));
+  std::iota(all.begin(), all.end(), 0);
+  return all;
 }
 
 void FittedPairs::rgb(const SampleSet& set, int texel, Part part, std::span<float> out) const {

@@ -29,6 +29,8 @@ class FittedPairs {
   [[nodiscard]] std::vector<float> weights_everywhere() const;
   /// weights(), written out.
   [[nodiscard]] Eigen::ArrayXf all_weights() const;
+  /// Of each pair of the frame its number in the set, view * lights + light.
+  [[nodiscard]] std::vector<int> numbers(const SampleSetInfo& info) const;
   /// As SampleSet::rgb(), at the pairs of the frame.
   void rgb(const SampleSet& set, int texel, Part part, std::span<float> out) const;
   /// As pyramid_rgb(), at the pairs of the frame.

@@ -16,6 +16,12 @@ set(VENEER_MODEL_SRCS
   models/fitted_pairs.cc
   models/half_angle.cc
   models/lafortune/lafortune.cc
+  models/layered/layer_fit.cc
+  models/layered/layer_heights.cc
+  models/layered/layer_stack.cc
+  models/layered/layer_views.cc
+  models/layered/layered.cc
+  models/layered/point_solver.cc
   models/lobes/lafortune_lobes.cc
   models/lobes/lobe_fit.cc
   models/local_pca.cc
@@ -42,6 +48,8 @@ set(VENEER_MODEL_TESTS
   models/dichromatic_lpca/dichromatic_lpca_test.cc
   models/half_angle_test.cc
   models/lafortune/lafortune_test.cc
+  models/layered/layer_fit_test.cc
+  models/layered/point_solver_test.cc
   models/lobes/lobe_fit_test.cc
   models/lobes/lobe_models_test.cc
   models/load_material_test.cc
@@ -59,6 +67,7 @@ set(VENEER_MODEL_SHADERS
   models/elevated_concentric.glsl
   models/half_angle.glsl
   models/lafortune/lafortune.glsl
+  models/layered/layered.glsl
   models/lobes/lafortune_lobes.glsl
   models/lobes/lobes.glsl
   models/lpca/lpca.glsl

@@ -35,7 +35,8 @@ bool has_form(const Model& model, std::string_view form) {
 }
 
 bool is_formula_of_view(const Model& model) {
-  return model.name == "lafortune" || model.name == "scaled-lafortune" || model.name == "phong";
+  return model.name == "lafortune" || model.name == "layered" || model.name == "scaled-lafortune" ||
+         model.name == "phong";
 }
 
 TEST(Models, AreFoundByNameAndOthersAreRefusedWithTheList) {
