@@ -36,8 +36,10 @@ double white_of(const render::EyePicture& picture) {
 }
 
 Status write(const render::EyePicture& picture, const RenderFromEyeOptions& options, double white) {
-  if (options.out.extension() == ".png")
-    return write_png(options.out, picture_of_xyz(picture.radiance_xyz.view(), white).view());
+  if (options.out.extension() == ".png") {
+    const Image<Rgb8> shown = picture_of_xyz(picture.radiance_xyz.view(), white);
+    return write_png(options.out, shown.view());
+  }
   std::vector<ExrChannel> channels;
   const char* const names[] = {"X", "Y", "Z", "A"};
   for (int c = 0; c < 4; ++c) {
