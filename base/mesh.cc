@@ -79,6 +79,17 @@ Mesh make_sphere() {
   });
 }
 
+/// Without ends, so that its texture is stretched nowhere.
+Mesh make_cylinder() {
+  static constexpr double kRadius = 0.05;
+  static constexpr double kHeight = 0.2;
+  return tessellate(128, 16, [](double u, double v) {
+    const double azimuth = 2 * std::numbers::pi * (u - 0.5);
+    const Vector3d normal(std::sin(azimuth), 0, std::cos(azimuth));
+    return SurfacePoint{kRadius * normal + kHeight * (0.5 - v) * Vector3d::UnitY(), normal};
+  });
+}
+
 /// A solid of revolution about y whose outline swells, narrows at the neck and opens again.
 Mesh make_vase() {
   constexpr double kHeight = 0.25;
@@ -101,8 +112,10 @@ struct BuiltIn {
   std::string_view name;
   Mesh (*make)();
 };
-constexpr std::array kBuiltIns{
-    BuiltIn{"plate", &make_plate}, BuiltIn{"sphere", &make_sphere}, BuiltIn{"vase", &make_vase}};
+constexpr std::array kBuiltIns{BuiltIn{"plate", &make_plate},
+                               BuiltIn{"cylinder", &make_cylinder},
+                               BuiltIn{"sphere", &make_sphere},
+                               BuiltIn{"vase", &make_vase}};
 
 Vector3d to_eigen(const aiVector3D& v) { return {v.x, v.y, v.z}; }
 
@@ -209,7 +222,7 @@ Result<Mesh> load_mesh(const std::filesystem::path& path_or_name) {
   if (std::error_code error; !std::filesystem::exists(path_or_name, error)) {
     return fail(Errc::kNotFound,
                 "reading the mesh {}: there is no such file, and the built-in ones are plate, "
-                "sphere and vase",
+                "cylinder, sphere and vase",
                 origin);
   }
   // A pipe or a device would be read for ever.

@@ -23,11 +23,11 @@ struct Mesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-/// A mesh from a file of any kind that assimp reads, told by the end of its name, or one of the
-/// built-in ones: "sphere" (radius 0.1 m), "plate" (0.2 m square in the xy plane, normal +z),
-/// "vase" (a solid of revolution about y, 0.25 m high, convex and concave parts). For the built-in
-/// ones, +u runs along +x on the side that faces +z. Errors: kNotFound, kBadFormat (an unknown
-/// kind; no triangles; no texture coordinates: says how to add them; non-finite numbers).
+/// A mesh from a file of any kind that assimp reads, told by the end of its name, or built in:
+/// "sphere" (radius 0.1 m), "plate" (0.2 m square in the xy plane, normal +z), "cylinder" (about y,
+/// 0.1 m wide, 0.2 m high, open), "vase" (a solid of revolution about y, 0.25 m high, convex and
+/// concave parts). Of these, +u runs along +x where they face +z. Errors: kNotFound, kBadFormat (an
+/// unknown kind; no triangles; no texture coordinates: says how to add them; non-finite numbers).
 [[nodiscard]] Result<Mesh> load_mesh(const std::filesystem::path& path_or_name);
 
 }  // namespace veneer

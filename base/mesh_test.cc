@@ -18,7 +18,7 @@ class BuiltInMesh : public testing::TestWithParam<const char*> {
 };
 INSTANTIATE_TEST_SUITE_P(All,
                          BuiltInMesh,
-                         testing::Values("plate", "sphere", "vase"),
+                         testing::Values("plate", "cylinder", "sphere", "vase"),
                          [](const auto& built_in) { return std::string(built_in.param); });
 
 TEST_P(BuiltInMesh, HasAnticlockwiseTrianglesAlongItsNormals) {

@@ -119,11 +119,15 @@ std::string nearest_miss(std::span<const TradePoint> points,
 }  // namespace
 
 FitReads reads_of(std::string_view model) {
-  constexpr FitReads kNothing{false, false, false, false, false, false, false};
+  constexpr FitReads kNothing{false, false, false, false, false, false, false, false};
   FitReads reads = kNothing;
   if (model == "phong") return reads;
   if (model == "lafortune" || model == "scaled-lafortune" || model == "reflectance-field") {
     reads.lobes = true;
+    return reads;
+  }
+  if (model == "layered") {
+    reads.layers = true;
     return reads;
   }
   if (model == "eigen-texture") {
@@ -156,6 +160,11 @@ std::string Candidate::name() const {
   if (has_components(model)) text += " " + fit.components;
   const auto add = [&text](const std::string& part) { text += ", " + part; };
   if (reads.lobes) text += fmt::format(" {} lobe{}", fit.lobes, fit.lobes == 1 ? "" : "s");
+  if (reads.layers) {
+    if (fit.layers > 0) text += fmt::format(" {} layer{}", fit.layers, fit.layers == 1 ? "" : "s");
+    if (fit.heights)
+      add(fmt::format("heights {:g} to {:g}", fit.heights->lowest, fit.heights->highest));
+  }
   if (reads.clusters && fit.clusters != usual.clusters)
     add(fmt::format("{} cluster{}", fit.clusters, fit.clusters == 1 ? "" : "s"));
   if (reads.angular && fit.angular != usual.angular) add(fmt::format("angular {}", fit.angular));
@@ -187,6 +196,11 @@ std::string Candidate::fit_key() const {
   };
   if (has_components(model)) key += "-" + keyed(fit.components);
   if (reads.lobes) add("lobes", fit.lobes);
+  if (reads.layers) {
+    if (fit.layers > 0) add("layers", fit.layers);
+    if (fit.heights)
+      add("heights", fmt::format("{}to{}", fit.heights->lowest, fit.heights->highest));
+  }
   if (reads.clusters) {
     if (fit.clusters != usual.clusters) add("clusters", fit.clusters);
     if (fit.basis != usual.basis) add("basis", fit.basis);

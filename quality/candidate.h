@@ -35,6 +35,7 @@ struct FitReads {
   bool clusters = true;  ///< and how they are found: basis, iterations, seed
   bool angular = true;
   bool lobes = true;
+  bool layers = true;  ///< and where they lie: heights
   bool precision = true;
   bool dichromatic = true;  ///< form, specular, clustering
   bool mip_levels = true;

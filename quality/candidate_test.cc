@@ -251,6 +251,14 @@ TEST(Candidate, NamesOnlyWhatIsReadAndUnusual) {
   phong.fit.clusters = 3;
   phong.drawing.cache.spacing = 8;  // it offers no cache
   EXPECT_EQ(phong.name(), "phong");
+  Candidate layered{"layered", {}, {}};
+  layered.fit.clusters = 3;
+  EXPECT_EQ(layered.name(), "layered");
+  layered.fit.layers = 1;
+  EXPECT_EQ(layered.name(), "layered 1 layer");
+  layered.fit.layers = 4;
+  layered.fit.heights = btf::HeightRange{-0.5, 2};
+  EXPECT_EQ(layered.name(), "layered 4 layers, heights -0.5 to 2");
 }
 
 // Every way in which two candidates can differ.
@@ -289,6 +297,12 @@ std::vector<Candidate> all_different() {
   }
   add("lafortune", [](Candidate& c) { c.fit.lobes = 1; });
   add("lafortune", [](Candidate& c) { c.fit.lobes = 2; });
+  add("layered", [](Candidate&) {});
+  add("layered", [](Candidate& c) { c.fit.layers = 1; });
+  add("layered", [](Candidate& c) { c.fit.layers = 4; });
+  for (const btf::HeightRange& heights :
+       {btf::HeightRange{0, 1}, {-1, 1}, {0.1, 1}, {0.1 + 1e-12, 1}, {-1e-9, 1}})
+    add("layered", [heights](Candidate& c) { c.fit.heights = heights; });
   return all;
 }
 
@@ -321,6 +335,8 @@ TEST(Candidate, IsTheSameWhateverItsModelDoesNotRead) {
   b.fit.components = "9";
   b.fit.form = "x";
   b.fit.lobes = 4;
+  b.fit.layers = 4;
+  b.fit.heights = btf::HeightRange{0, 1};
   EXPECT_EQ(a.key(), b.key());
 }
 

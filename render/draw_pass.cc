@@ -2,11 +2,8 @@
 #include "render/draw_pass.h"
 
 #include <algorithm>
-#include <array>
-#include <cstddef>
-#include <numbers>
 
-#include "base/colour.h"
+#include "render/frame_block.h"
 
 namespace veneer::render {
 namespace {
@@ -31,40 +28,8 @@ constexpr char kProbeFrag[] =
 #include "render/shaders/probe.frag.inc"
     ;
 
-// The block Frame of frame.glsl, with room for every light; a program reads as much as it declares.
-struct FrameBlock {
-  Eigen::Matrix4f clip_from_object;
-  Eigen::Matrix4f xyz_from_rgb;
-  Eigen::Vector4f eye;
-  Eigen::Vector4f projector;
-  Eigen::Vector2f texture_repeats;
-  float specular_weight;
-  float unused;
-  std::array<Eigen::Vector4f, 2 * kMaxLights> lights;  // lights[n], then light_rgb[n]
-};
-static_assert(offsetof(FrameBlock, lights) == 2 * 64 + 3 * 16);
-
 std::string header(int light_count) {
   return fmt::format("#version 450 core\n#define LIGHT_COUNT {}\n", light_count) + kFrameGlsl;
-}
-
-Eigen::Vector4f homogeneous(const Eigen::Vector3d& v, double w) {
-  return Eigen::Vector4d(v.x(), v.y(), v.z(), w).cast<float>();
-}
-
-struct LightUniform {
-  Eigen::Vector4f light;
-  Eigen::Vector4f rgb;
-};
-
-LightUniform uniform_of(const Light& light, const RigidTransform& object_from_world) {
-  // A material's sample is its radiance times pi over the irradiance.
-  if (const auto* sun = std::get_if<DirectionalLight>(&light))
-    return {homogeneous(object_from_world.rotation * sun->direction_to_light, 0.0),
-            homogeneous(sun->illuminance_rgb / std::numbers::pi, 0.0)};
-  const auto& lamp = std::get<PointLight>(light);
-  return {homogeneous(object_from_world * lamp.position, 1.0),
-          homogeneous(lamp.intensity_rgb / std::numbers::pi, 0.0)};
 }
 
 }  // namespace
@@ -80,7 +45,10 @@ Eigen::Matrix4d clip_from_projector(const calibration::ProjectorGeometry& g) {
   return m;
 }
 
-std::string draw_vertex_source(int light_count) { return header(light_count) + kDrawVert; }
+std::string draw_vertex_source(int light_count, Surfaces surfaces) {
+  return header(light_count) + (surfaces == Surfaces::kShells ? "#define SHELLS\n" : "") +
+         kDrawVert;
+}
 
 std::string surface_header(int light_count) { return header(light_count) + kSurfaceGlsl; }
 
@@ -227,22 +195,12 @@ void DrawPass::draw(GLuint framebuffer,
                     const MeshBuffers& mesh,
                     const DrawInput& input,
                     const DrawMask* mask) const {
-  const RigidTransform object_from_world = input.world_from_object.inverse();
-  FrameBlock block;
-  block.clip_from_object = (clip_from_world_ * input.world_from_object.matrix()).cast<float>();
-  block.xyz_from_rgb = Eigen::Matrix4f::Identity();
-  block.xyz_from_rgb.topLeftCorner<3, 3>() = xyz_from_srgb().cast<float>();
-  block.eye = homogeneous(object_from_world * input.eye_in_world, 1.0);
-  block.projector = homogeneous(object_from_world * projector_in_world_,
-                                reference_distance_m_ * reference_distance_m_);
-  block.texture_repeats = texture_repeats_.cast<float>();
-  block.specular_weight = static_cast<float>(input.specular_weight);
-  block.unused = 0.0F;
-  for (std::size_t i = 0; i < lights_.size(); ++i) {
-    const LightUniform light = uniform_of(lights_[i], object_from_world);
-    block.lights[i] = light.light;
-    block.lights[lights_.size() + i] = light.rgb;
-  }
+  FrameBlock block = frame_block(lights_,
+                                 texture_repeats_,
+                                 clip_from_world_,
+                                 projector_in_world_,
+                                 reference_distance_m_,
+                                 input);
   glNamedBufferSubData(uniforms_.id(), 0, sizeof(block), &block);
 
   if (cache_) {

@@ -17,6 +17,7 @@
 #include "render/draw_target.h"
 #include "render/evaluation.h"
 #include "render/fade_mask.h"
+#include "render/frame_block.h"
 #include "render/gl_objects.h"
 #include "render/mesh_buffers.h"
 #include "render/model_textures.h"
@@ -41,7 +42,9 @@ struct DrawOptions {
 inline constexpr double kNearPlane = 0.01;  // metres
 
 /// The sources of the draw program for a model and a number of lights, complete and compilable.
-[[nodiscard]] std::string draw_vertex_source(int light_count);
+/// Of shells the vertex program moves the mesh along its normals by `uniform float shell_height`.
+enum class Surfaces { kMesh, kShells };
+[[nodiscard]] std::string draw_vertex_source(int light_count, Surfaces surfaces = Surfaces::kMesh);
 /// What fragment shaders of the surface begin with: version, uniforms and surface.glsl.
 [[nodiscard]] std::string surface_header(int light_count);
 [[nodiscard]] std::string draw_fragment_source(const std::string& model_source,
@@ -52,13 +55,6 @@ inline constexpr double kNearPlane = 0.01;  // metres
 [[nodiscard]] std::string plain_fragment_source(int light_count, bool point_lights);
 /// The same for reading back what each pixel asks, probe.frag.
 [[nodiscard]] std::string probe_fragment_source(int light_count);
-
-/// Where a frame is seen from and drawn on.
-struct DrawInput {
-  Eigen::Vector3d eye_in_world;
-  RigidTransform world_from_object;
-  double specular_weight = 1.0;  ///< as FrameInput's
-};
 
 /// Draws a mesh in a material, as the projector sees it, into an RGBA16F target with depth: XYZ in
 /// cd/m^2 and the geometric factor (surface.glsl). Needs a current context, always the same.

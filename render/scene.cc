@@ -19,7 +19,7 @@ constexpr double kMaxRepeats = 1000.0;
 constexpr double kMaxLight = 1e7;
 
 bool is_built_in(std::string_view mesh) {
-  constexpr std::array<std::string_view, 3> kBuiltIn{"sphere", "plate", "vase"};
+  constexpr std::array<std::string_view, 4> kBuiltIn{"sphere", "plate", "cylinder", "vase"};
   return std::ranges::find(kBuiltIn, mesh) != kBuiltIn.end();
 }
 

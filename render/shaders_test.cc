@@ -6,10 +6,20 @@
 #include "render/fade_mask.h"
 #include "render/internal_glslang.h"
 #include "render/scanout_pass.h"
+#include "render/shell_pass.h"
 #include "render/upsample_pass.h"
 
 namespace veneer::render {
 namespace {
+
+btf::ModelShader model_of_shells() {
+  btf::ModelShader shader;
+  shader.source =
+      "vec4 btf_shell(int layer, vec2 uv, vec3 view, vec3 light) { return vec4(uv, light.z, "
+      "layer); }";
+  shader.shells = btf::ShellLayers{{1.0F, 0.0F}};
+  return shader;
+}
 
 constexpr char kAnyModel[] =
     "vec3 btf_radiance(vec2 uv, vec3 view, vec3 light) { return vec3(uv, view.z + light.z); }";
@@ -26,7 +36,10 @@ TEST(Shaders, AreValidByTheReferenceCompiler) {
   for (const bool has_part : {false, true})
     EXPECT_EQ(glslang_complaints(upsample_fragment_source(has_part), "frag"), "");
   EXPECT_EQ(glslang_complaints(scanout_fragment_source(), "frag"), "");
+  EXPECT_EQ(glslang_complaints(shell_under_fragment_source(), "frag"), "");
   for (const int lights : {1, kMaxLights}) {
+    EXPECT_EQ(glslang_complaints(shell_vertex_source(lights), "vert"), "");
+    EXPECT_EQ(glslang_complaints(shell_fragment_source(model_of_shells(), lights), "frag"), "");
     EXPECT_EQ(glslang_complaints(draw_vertex_source(lights), "vert"), "");
     EXPECT_EQ(glslang_complaints(probe_fragment_source(lights), "frag"), "");
     for (const bool point_lights : {false, true})

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <csignal>
@@ -12,6 +13,7 @@
 #include <utility>
 
 #include "base/files.h"
+#include "base/image_files.h"
 #include "base/safetensors.h"
 #include "base/testing/temporary_folder.h"
 #include "tests/program.h"
@@ -500,6 +502,46 @@ TEST_F(ProgramsTest, RenderWritesAPictureOrALuminanceImage) {
   EXPECT_TRUE(fs::exists(at("frame.png")));
   EXPECT_TRUE(fs::exists(at("frame.exr")));
   EXPECT_TRUE(fails(run(line + text("frame.bmp")), 2, ".png or .exr"));
+}
+
+TEST_F(ProgramsTest, RenderShowsWhatAnEyeSees) {
+  const auto line = [](const char* material) {
+    return "veneer render " + text("scene.toml") + " --material " + text(material) +
+           " --eye 0,0.2,0.9 --json -o " + text("seen.exr") + " ";
+  };
+  const std::string eye = "--from-eye --size 64x48 ";
+  const auto brightest = [] {
+    const auto picture = read_exr_rgb(at("seen.exr"), {"X", "Y", "Z"});
+    EXPECT_TRUE(picture) << picture.error().what;
+    float most = 0;
+    if (picture)
+      for (const Rgb32f& pixel : picture->pixels()) most = std::max(most, pixel.maxCoeff());
+    return most;
+  };
+  const Outcome plain = run(line("material.safetensors") + eye + "--white 100");
+  ASSERT_EQ(plain.exit_code, 0) << plain.err;
+  EXPECT_EQ(nlohmann::json::parse(plain.out).at("white_nits"), 100);
+  EXPECT_GT(brightest(), 1.0F);
+  const auto channels = read_exr(at("seen.exr"));
+  ASSERT_TRUE(channels) << channels.error().what;
+  EXPECT_EQ(channels->size(), 4U);
+
+  ASSERT_EQ(run("veneer fit " + text("cloth.btfset") + " --model layered -o " +
+                text("layered.safetensors"))
+                .exit_code,
+            0);
+  const Outcome shells = run(line("layered.safetensors") + eye + "--shells");
+  ASSERT_EQ(shells.exit_code, 0) << shells.err;
+  EXPECT_GT(nlohmann::json::parse(shells.out).at("texel_mm").at("mean"), 0.0);
+
+  const std::string projector = "--profile " + text("profile") + " ";
+  EXPECT_TRUE(fails(run(line("material.safetensors") + eye + "--shells"), 2, "model layered"));
+  EXPECT_TRUE(fails(run(line("material.safetensors") + eye + projector), 2, "--from-eye"));
+  EXPECT_TRUE(fails(run(line("layered.safetensors") + projector + "--shells"), 2, "--from-eye"));
+  EXPECT_TRUE(fails(run(line("material.safetensors")), 2, "--profile"));
+  EXPECT_TRUE(fails(run(line("material.safetensors") + "--from-eye --size 64"), 2, "WIDTHxHEIGHT"));
+  EXPECT_TRUE(fails(run(line("material.safetensors") + eye + "--white -1"), 2, "--white"));
+  EXPECT_TRUE(fails(run(line("material.safetensors") + eye + "--samples 9"), 2, "1 to 8"));
 }
 
 }  // namespace

@@ -42,6 +42,7 @@ class ScratchFolder {
 struct Candidate {
   std::string_view model;
   std::string_view components;
+  int layers = 0;
 };
 constexpr int kIterations = 60;      // where errors count
 constexpr int kRoughIterations = 5;  // where only times do
@@ -59,6 +60,8 @@ constexpr std::array kCandidates{
     Candidate{"dichromatic-lpca", "4+4"},
     Candidate{"texel-colours", "3+1"},
     Candidate{"texel-colours", "6+2"},
+    Candidate{"layered", "", 2},
+    Candidate{"layered", "", 4},
 };
 
 /// A material, and once more in every way that it offers and that is asked for.
@@ -96,10 +99,12 @@ Result<std::vector<render::RenderBenchMaterial>> fit_candidates(const btf::Sampl
     btf::FitOptions options;
     if (!candidate.components.empty()) options.components = candidate.components;
     options.iterations = iterations;
+    options.layers = candidate.layers;
     VENEER_ASSIGN(std::unique_ptr<btf::Material> fitted, model->fit(set, options, progress));
     const std::shared_ptr<const btf::Material> material = std::move(fitted);
     std::string name(candidate.model);
     if (!candidate.components.empty()) name += fmt::format(" {}", candidate.components);
+    if (candidate.layers > 0) name += fmt::format(" {} layers", candidate.layers);
     add(name, material, how, materials);
   }
   return materials;

@@ -30,7 +30,8 @@ const std::array kEntries{Entry{"lafortune", ""},
                           Entry{"revised-lpca", "8"},
                           Entry{"texel-colours", "3+1"},
                           Entry{"texel-colours", "6+2"},
-                          Entry{"dichromatic-lpca", "4+4"}};
+                          Entry{"dichromatic-lpca", "4+4"},
+                          Entry{"layered", ""}};
 
 struct CompareOptions {
   std::filesystem::path set;

@@ -65,6 +65,7 @@ ordered_json options_json(const quality::Candidate& candidate) {
   const auto model = btf::find_model(candidate.model);
   if (!model || (*model)->terms > 0) json["components"] = fit.components;
   if (reads.lobes) json["lobes"] = fit.lobes;
+  if (reads.layers) json["layers"] = fit.layers;
   if (reads.clusters) json["clusters"] = fit.clusters;
   if (reads.angular) json["angular"] = fit.angular;
   if (reads.precision) json["precision"] = fit.precision;

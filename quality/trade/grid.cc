@@ -17,6 +17,7 @@ struct Sizes {
   std::vector<std::string> two_terms;
   std::vector<std::string> images;  ///< components of models without clusters
   std::vector<int> lobes;
+  std::vector<int> layers;
   std::vector<int> clusters;
   std::vector<int> angular;
   std::vector<DrawingOptions> drawings;        ///< of a model's first fit
@@ -37,6 +38,7 @@ Sizes sizes_of(Grid grid) {
             .two_terms = {"3+1", "6+2"},
             .images = {"16", "8"},
             .lobes = {2, 1},
+            .layers = {4, 2, 1},
             .clusters = {32, 8},
             .angular = {16, 8},
             .drawings = {drawing(0, false, 1),
@@ -63,14 +65,15 @@ Sizes sizes_of(Grid grid) {
           .two_terms = {"3+1", "2+2", "4+2", "6+2", "4+4", "8+4"},
           .images = {"16", "4", "8", "12"},
           .lobes = {2, 1, 3, 4},
+          .layers = {4, 1, 2, 3, 6},
           .clusters = {32, 4, 8, 16, 64},
           .angular = {16, 6, 8, 12, 24},
           .drawings = drawings,
           .other_drawings = drawings};
 }
 
-/// The fits of one model: all numbers of components, or of lobes, at the usual sizes; the other
-/// sizes one by one at the first number of components.
+/// The fits of one model: all numbers of components, of lobes or of layers, at the usual sizes; the
+/// other sizes one by one at the first number of components.
 std::vector<FitOptions> fits_of(const btf::Model& model,
                                 const btf::SampleSetInfo& set,
                                 Grid grid,
@@ -78,20 +81,24 @@ std::vector<FitOptions> fits_of(const btf::Model& model,
   const Sizes sizes = sizes_of(grid);
   const FitReads reads = reads_of(model.name);
   std::vector<FitOptions> fits;
-  if (model.terms == 0 && !reads.lobes) return {base};
-  if (model.terms == 0) {
-    for (const int lobes : sizes.lobes) {
+  const auto each = [&](int FitOptions::*field, const std::vector<int>& values) {
+    for (const int value : values) {
       fits.push_back(base);
-      fits.back().lobes = lobes;
+      fits.back().*field = value;
     }
+  };
+  if (model.terms == 0) {
+    if (reads.lobes) each(&FitOptions::lobes, sizes.lobes);
+    if (reads.layers) each(&FitOptions::layers, sizes.layers);
+    if (fits.empty()) fits.push_back(base);
     return fits;
   }
   const std::vector<std::string>& components = model.terms == 2 ? sizes.two_terms
                                                : reads.clusters ? sizes.one_term
                                                                 : sizes.images;
-  for (const std::string& each : components) {
+  for (const std::string& count : components) {
     fits.push_back(base);
-    fits.back().components = each;
+    fits.back().components = count;
   }
   const FitOptions first = fits.front();
   const auto vary = [&](auto FitOptions::*field, const auto& values) {

@@ -20,11 +20,11 @@ enum class Grid {
 [[nodiscard]] std::string_view name_of(Grid grid);
 
 /// What is measured: each model of the registry that the set allows, at several sizes (components,
-/// clusters, lobes, angular resolution, storage precision) and drawn in several ways (hardware
-/// volumes per pixel or the angular cache, with or without the mean over texels, render scale).
-/// Each once, those of one fit beside each other. In the coarse grid a model is drawn in every way
-/// at its first size; its other sizes in those two that show what the size does: per pixel and from
-/// the cache, texels averaged, at full scale.
+/// clusters, lobes, layers, angular resolution, storage precision) and drawn in several ways
+/// (hardware volumes per pixel or the angular cache, with or without the mean over texels, render
+/// scale). Each once, those of one fit beside each other. In the coarse grid a model is drawn in
+/// every way at its first size; its other sizes in those two that show what the size does: per
+/// pixel and from the cache, texels averaged, at full scale.
 struct GridOptions {
   Grid grid = Grid::kCoarse;
   std::vector<std::string> models{};  ///< of the registry; none: all

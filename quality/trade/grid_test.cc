@@ -70,6 +70,7 @@ TEST(Grid, VariesEverySize) {
     EXPECT_GE(values([](const Candidate& c) { return c.fit.components; }), 5U);
     EXPECT_GE(values([](const Candidate& c) { return c.fit.clusters; }), 2U);
     EXPECT_GE(values([](const Candidate& c) { return c.fit.lobes; }), 2U);
+    EXPECT_GE(values([](const Candidate& c) { return c.fit.layers; }), 4U);  // 0: other models'
     EXPECT_GE(values([](const Candidate& c) { return c.fit.angular; }), 2U);
     EXPECT_GE(values([](const Candidate& c) { return c.fit.precision; }), 2U);
     EXPECT_GE(values([](const Candidate& c) { return c.drawing.cache.spacing; }), 2U);

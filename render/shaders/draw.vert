@@ -10,13 +10,21 @@ out Surface {
   vec2 uv;
 } surface;
 
+#ifdef SHELLS
+uniform float shell_height;  // above the mesh, metres
+#endif
+
 // Two programs draw one mesh, and their triangles must meet.
 invariant gl_Position;
 
 void main() {
-  surface.position = position;
+  vec3 place = position;
+#ifdef SHELLS
+  place += shell_height * normal;
+#endif
+  surface.position = place;
   surface.normal = normal;
   surface.tangent = tangent;
   surface.uv = texture_coordinate * frame.texture_repeats;
-  gl_Position = frame.clip_from_object * vec4(position, 1.0);
+  gl_Position = frame.clip_from_object * vec4(place, 1.0);
 }

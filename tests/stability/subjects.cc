@@ -21,6 +21,10 @@ constexpr double kHalf = 4.0 * 0x1p-11;
 constexpr double kByte = 1.0 / 127.0;
 // Formulas and grids are continuous: what 1e-7 radians make of them, measured 2.6e-7.
 constexpr double kSmooth = 2e-6;
+// A stack of layers has steps, where a ray goes over to the next texel, as high as these differ.
+// They lie on curves of directions that none of the families' seams is on with these heights, in
+// texels; between them it is a formula.
+constexpr btf::HeightRange kLayersAt{-0.37, 0.71};
 // Cells of a table keep one triangle each, so that there is a step where the next cell has another;
 // measured 5.6e-6.
 constexpr double kTable = 5e-5;
@@ -44,6 +48,12 @@ btf::FitOptions dichromatic(const char* form, const char* specular, const char* 
   options.clustering = clustering;
   return options;
 }
+btf::FitOptions with_layers(int layers, const btf::HeightRange& heights) {
+  btf::FitOptions options = options_of("4");
+  options.layers = layers;
+  options.heights = heights;
+  return options;
+}
 btf::FitOptions with_mip_levels() {
   btf::FitOptions options = options_of("3+1");
   options.mip_levels = 2;
@@ -60,6 +70,8 @@ std::span<const Subject> subjects() {
       {"Lafortune", "lafortune", options_of("4"), false, kHalf, kSmooth},
       {"ScaledLafortune", "scaled-lafortune", options_of("4"), false, kHalf, kTable},
       {"ReflectanceField", "reflectance-field", options_of("4"), false, kHalf, kTable},
+      {"LayeredFlat", "layered", with_layers(1, {0.0, 0.0}), false, kHalf, kSmooth},
+      {"LayeredStack", "layered", with_layers(3, kLayersAt), false, kHalf, kSmooth},
       {"EigenTexture8Bit", "eigen-texture", with_precision("8bit"), true, kByte, kTable},
       {"EigenTextureFloat16", "eigen-texture", with_precision("float16"), true, kHalf, kTable},
       {"Lpca", "lpca", options_of("4"), true, kHalf, kTable},

@@ -2,34 +2,37 @@ uniform sampler2DArray Layers;
 
 // LayerStack in float; change both or none. Before it stand the constants kTexels, kLayers, kHeights
 // and kLeastCosine. Of layer n: 4n: K_d, transmittance; K_s, k; C, L_d; N.
-vec2 layer_shift(float rise, vec3 direction) {
-  float scale = rise / max(direction.z, kLeastCosine);
-  return vec2(scale * direction.x, -scale * direction.y);  // rows grow towards -y
+
+// By how many texels along columns and rows a ray moves while it rises by one.
+vec2 layer_slope(vec3 direction) {
+  // Rows grow towards -y.
+  return vec2(direction.x, -direction.y) / max(direction.z, kLeastCosine);
 }
 
-// A texel of the tile, which repeats.
+// A texel of the tile, which repeats. Half a texel up, since GPUs divide to within rounding only.
 ivec2 layer_texel(vec2 place) {
   vec2 texel = floor(place);
-  texel -= vec2(kTexels) * floor(texel / vec2(kTexels));
+  texel -= vec2(kTexels) * floor((texel + 0.5) / vec2(kTexels));
   return clamp(ivec2(texel), ivec2(0), kTexels - 1);
 }
 
-float layer_arriving(int layer, ivec2 texel, vec3 light) {
+float layer_arriving(int layer, ivec2 texel, vec2 slope) {
   float share = 1.0;
   for (int above = layer - 1; above >= 0 && share > 0.0; --above) {
-    vec2 shift = layer_shift(kHeights[above] - kHeights[layer], light);
+    vec2 shift = (kHeights[above] - kHeights[layer]) * slope;
     share *= texelFetch(Layers, ivec3(layer_texel(vec2(texel) + 0.5 + shift), 4 * above), 0).a;
   }
   return share;
 }
 
-// `first` is what the layer's first texture holds there.
+// `first` is what the layer's first texture holds there; what tells that the rest is dark comes first.
 vec3 layer_radiance(int layer, ivec2 texel, vec4 first, vec3 view, vec3 light) {
   float cosine = dot(texelFetch(Layers, ivec3(texel, 4 * layer + 3), 0).xyz, light);
   if (!(cosine > 0.0)) return vec3(0.0);
-  vec4 specular = texelFetch(Layers, ivec3(texel, 4 * layer + 1), 0);
   vec4 shape = texelFetch(Layers, ivec3(texel, 4 * layer + 2), 0);
-  float arrived = layer_arriving(layer, texel, light) + shape.w;
+  float arrived = layer_arriving(layer, texel, layer_slope(light)) + shape.w;
+  if (!(arrived > 0.0)) return vec3(0.0);
+  vec4 specular = texelFetch(Layers, ivec3(texel, 4 * layer + 1), 0);
   float peak = lobe(vec4(shape.xyz, specular.w), view * light);
   return arrived * cosine * (first.rgb + peak * specular.rgb);
 }
@@ -38,10 +41,11 @@ vec3 btf_radiance(vec2 uv, vec3 view, vec3 light) {
   if (!(light.z > 0.0)) return vec3(0.0);
   view.z = max(view.z, 0.0);
   vec2 place = fract(uv) * vec2(kTexels);
+  vec2 slope = layer_slope(view);
   vec3 seen = vec3(0.0);
   float visible = 1.0;
   for (int layer = 0; layer < kLayers && visible > 0.0; ++layer) {
-    ivec2 texel = layer_texel(place + layer_shift(kHeights[layer], view));
+    ivec2 texel = layer_texel(place + kHeights[layer] * slope);
     vec4 first = texelFetch(Layers, ivec3(texel, 4 * layer), 0);
     seen += visible * layer_radiance(layer, texel, first, view, light);
     visible *= first.a;
