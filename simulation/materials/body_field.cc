@@ -34,7 +34,27 @@ Eigen::Vector3d Body::nearest(const Eigen::Vector3d& place) const {
   const Eigen::Vector3d along = second - first;
   const double square = along.squaredNorm();
   if (square == 0.0) return first;
+  if (core == Core::kDisc) {
+    const Eigen::Vector3d off = place - first;
+    const Eigen::Vector3d across = off - off.dot(along) / square * along;
+    const double outside = across.squaredNorm() / square;
+    return first + (outside > 1.0 ? Eigen::Vector3d(across / std::sqrt(outside)) : across);
+  }
   return first + std::clamp((place - first).dot(along) / square, 0.0, 1.0) * along;
+}
+
+std::array<Eigen::Vector3d, 2> Body::bounds() const {
+  Eigen::Vector3d low = first.cwiseMin(second);
+  Eigen::Vector3d high = first.cwiseMax(second);
+  if (core == Core::kDisc) {
+    // Along each axis the disc reaches as far as its own axis leaves it.
+    const Eigen::Vector3d along = second - first;
+    const Eigen::Vector3d reach =
+        (along.squaredNorm() - along.array().square()).cwiseMax(0.0).sqrt().matrix();
+    low = first - reach;
+    high = first + reach;
+  }
+  return {low.array() - radius, high.array() + radius};
 }
 
 Body sphere(const Eigen::Vector3d& middle, double radius) {
@@ -43,6 +63,10 @@ Body sphere(const Eigen::Vector3d& middle, double radius) {
 
 Body capsule(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double radius) {
   return {Body::Core::kLine, from, to, radius};
+}
+
+Body disc(const Eigen::Vector3d& middle, const Eigen::Vector3d& axis, double half_thickness) {
+  return {Body::Core::kDisc, middle, middle + axis, half_thickness};
 }
 
 Body endless_bar(bool along_x,

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 
+#include <array>
 #include <functional>
 #include <vector>
 
@@ -12,14 +13,16 @@
 namespace veneer::simulation {
 
 /// A rounded thing: all that is no further than `radius` from its core. The core is the line
-/// between two points (a capsule; a sphere where they are one), or a box with sides along the axes.
-/// Lengths in tile widths; x along columns, y downwards, z up.
+/// between two points (a capsule; a sphere where they are one), a box with sides along the axes, or
+/// a round disc. Lengths in tile widths; x along columns, y downwards, z up.
 struct Body {
-  enum class Core { kLine, kBox };
+  enum class Core { kLine, kBox, kDisc };
   Core core = Core::kLine;
-  Eigen::Vector3d first = Eigen::Vector3d::Zero();   ///< an end of the line; the box's least corner
-  Eigen::Vector3d second = Eigen::Vector3d::Zero();  ///< the other end; the box's greatest corner
-  double radius = 0.0;                               ///< > 0
+  /// An end of the line; the box's least corner; the disc's middle.
+  Eigen::Vector3d first = Eigen::Vector3d::Zero();
+  /// The other end; the box's greatest corner; the end of the disc's axis, as long as its radius.
+  Eigen::Vector3d second = Eigen::Vector3d::Zero();
+  double radius = 0.0;  ///< > 0
 
   /// The point of the core that is nearest.
   [[nodiscard]] Eigen::Vector3d nearest(const Eigen::Vector3d& place) const;
@@ -27,10 +30,16 @@ struct Body {
   [[nodiscard]] double distance(const Eigen::Vector3d& place) const {
     return (place - nearest(place)).norm() - radius;
   }
+  /// The least box with sides along the axes that holds it: two corners.
+  [[nodiscard]] std::array<Eigen::Vector3d, 2> bounds() const;
 };
 
 [[nodiscard]] Body sphere(const Eigen::Vector3d& middle, double radius);
 [[nodiscard]] Body capsule(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double radius);
+/// A leaf. @param axis  at right angles to it, as long as its radius @param half_thickness  > 0
+[[nodiscard]] Body disc(const Eigen::Vector3d& middle,
+                        const Eigen::Vector3d& axis,
+                        double half_thickness);
 /// A bar without ends along x or y. @param across  where its middle line crosses the other axis
 /// @param half_width, half_thickness  > radius, which rounds its edges
 [[nodiscard]] Body endless_bar(bool along_x,

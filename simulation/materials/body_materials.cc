@@ -12,10 +12,8 @@ namespace {
 constexpr std::array kMaterials{
     BodyMaterial{
         "bars", "painted bars that hover crosswise over a ground", &make_bars, kBarHeights},
-    BodyMaterial{"lichen",
-                 "branches of lichen on stalks over rock, with overhangs",
-                 &make_lichen,
-                 kLichenHeights},
+    BodyMaterial{
+        "lichen", "drooping leaves of lichen on stalks over rock", &make_lichen, kLichenHeights},
 };
 static_assert(std::ranges::is_sorted(kMaterials, {}, &BodyMaterial::name));
 

@@ -24,7 +24,7 @@ struct BodyMaterial {
 
 /// In equal steps, as fits of layers have them.
 inline constexpr std::array kBarHeights{0.10, 0.05, 0.0};
-inline constexpr std::array kLichenHeights{0.11, 0.055, 0.0};
+inline constexpr std::array kLichenHeights{0.12, 0.06, 0.0};
 
 /// Every one, sorted by name.
 [[nodiscard]] std::span<const BodyMaterial> body_materials();

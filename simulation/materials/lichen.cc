@@ -11,35 +11,38 @@ namespace veneer::simulation {
 namespace {
 
 // Lengths in tile widths.
-constexpr int kPlants = 3;         // along each side of the tile; one in four places is bare
-constexpr double kJitter = 0.10;   // of their places
-constexpr double kStalk = 0.014;   // radius
-constexpr double kBranch = 0.034;  // radius
-constexpr double kReach = 0.085;   // of a branch
+constexpr int kPlants = 3;  // along each side of the tile; some places are bare
+constexpr double kBare = 0.15;
+constexpr double kJitter = 0.10;  // of their places
+constexpr double kStalk = 0.014;  // radius
+constexpr double kLeaf = 0.070;   // radius
+constexpr double kHalfThickness = 0.010;
+constexpr double kOff = 0.065;     // of a leaf's middle from the stalk
+constexpr double kDroop = 0.30;    // tangent of its outward slope
 constexpr double kStorey = 0.010;  // how far plants differ in height
-constexpr int kBranches = 3;
+constexpr int kLeaves = 3;
 
 void add_plant(const Eigen::Vector3d& crown, double turn, BodyField& field) {
   const Eigen::Vector3d root(crown.x(), crown.y(), 0.0);
   field.bodies.push_back(capsule(root, crown, kStalk));
-  for (int i = 0; i < kBranches; ++i) {
-    const double angle = 2.0 * std::numbers::pi * (turn + double(i) / kBranches);
-    const Eigen::Vector3d tip =
-        crown + kReach * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0.0);
-    field.bodies.push_back(capsule(crown, tip, kBranch));
+  for (int i = 0; i < kLeaves; ++i) {
+    const double angle = 2.0 * std::numbers::pi * (turn + double(i) / kLeaves);
+    const Eigen::Vector3d out(std::cos(angle), std::sin(angle), 0.0);
+    const Eigen::Vector3d axis = kLeaf * (kDroop * out + Eigen::Vector3d::UnitZ()).normalized();
+    field.bodies.push_back(disc(crown + kOff * out, axis, kHalfThickness));
   }
 }
 
 }  // namespace
 
-// Plants of two storeys on thin stalks over rock, their branches free above it.
+// Plants of two storeys on thin stalks over rock, their drooping leaves free above it.
 BodyField make_lichen(int size, std::uint64_t seed) {
   BodyField field;
   field.resolution = size * kCellsPerTexel;
   for (int row = 0; row < kPlants; ++row) {
     for (int column = 0; column < kPlants; ++column) {
       const auto random = [&](std::uint64_t i) { return lattice_random(column, row, seed + i); };
-      if (random(0) < 0.25) continue;
+      if (random(0) < kBare) continue;
       const double storey = kLichenHeights[random(1) < 0.5 ? 0 : 1];
       add_plant({(column + 0.5) / kPlants + kJitter * (random(2) - 0.5),
                  (row + 0.5) / kPlants + kJitter * (random(3) - 0.5),

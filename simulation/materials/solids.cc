@@ -50,17 +50,17 @@ void Solids::add(const Body& body, int number) {
   // tile: all its parts are alike.
   std::array<int, 2> first{};
   std::array<int, 2> last{};
+  const auto [low, high] = body.bounds();
   for (int axis = 0; axis < 2; ++axis) {
     const auto at = static_cast<std::size_t>(axis);
-    const double low = std::min(body.first[axis], body.second[axis]) - body.radius;
-    const double high = std::max(body.first[axis], body.second[axis]) + body.radius;
-    const bool endless = std::isinf(low);
+    const bool endless = std::isinf(low[axis]);
     // A touch more, for what rounding leaves on the wrong side of a wall.
-    first[at] = endless ? 0 : static_cast<int>(std::floor((low - kLift) * kColumns));
-    last[at] = endless ? kColumns - 1 : static_cast<int>(std::floor((high + kLift) * kColumns));
+    first[at] = endless ? 0 : static_cast<int>(std::floor((low[axis] - kLift) * kColumns));
+    last[at] =
+        endless ? kColumns - 1 : static_cast<int>(std::floor((high[axis] + kLift) * kColumns));
   }
-  const double bottom = std::min(body.first.z(), body.second.z()) - body.radius;
-  const double top = std::max(body.first.z(), body.second.z()) + body.radius;
+  const double bottom = low.z();
+  const double top = high.z();
   top_ = std::max(top_, top + kLift);
   for (int y = first[1]; y <= last[1]; ++y) {
     for (int x = first[0]; x <= last[0]; ++x) {

@@ -28,11 +28,12 @@ BodyField field_of(std::vector<Body> bodies) {
   return field;
 }
 
-// Spheres, a leaning capsule and a bar; some across the tile's edges.
+// Spheres, a leaning capsule, a leaf and a bar; some across the tile's edges.
 BodyField clutter() {
   return field_of({sphere({0.3, 0.4, 0.15}, 0.1),
                    sphere({0.98, 0.02, 0.2}, 0.12),
                    capsule({0.6, 0.9, 0.0}, {0.75, 1.1, 0.3}, 0.04),
+                   disc({0.7, 0.3, 0.2}, {0.03, -0.05, 0.08}, 0.01),
                    endless_bar(true, 0.6, 0.3, 0.08, 0.03, 0.01)});
 }
 
@@ -43,12 +44,43 @@ TEST(Body, DistancesAreThoseOfItsShape) {
   const Body rod = capsule({0.0, 0.0, 0.0}, {1.0, 0.0, 0.0}, 0.1);
   EXPECT_NEAR(rod.distance({0.5, 0.4, 0.3}), 0.4, 1e-12);
   EXPECT_NEAR(rod.distance({1.3, 0.4, 0.0}), 0.4, 1e-12);
+  const Body leaf = disc({0.0, 0.0, 1.0}, {0.0, 0.0, 0.5}, 0.1);
+  EXPECT_NEAR(leaf.distance({0.3, 0.2, 0.2}), 0.7, 1e-12);
+  EXPECT_NEAR(leaf.distance({0.9, 0.0, 1.3}), 0.4, 1e-12);
   const Body bar = endless_bar(false, 0.5, 0.2, 0.1, 0.04, 0.01);
   for (const double y : {-3.0, 0.0, 0.7}) {
     EXPECT_NEAR(bar.distance({0.5, y, 0.3}), 0.06, 1e-12);
     EXPECT_NEAR(bar.distance({0.7, y, 0.2}), 0.1, 1e-12);
     EXPECT_NEAR(
         bar.distance({0.69 + 0.03, y, 0.23 + 0.04}), std::hypot(0.13, 0.04 + 0.0) - 0.01, 1e-12);
+  }
+}
+
+TEST(Body, StaysWithinItsBounds) {
+  for (const Body& body : clutter().bodies) {
+    const auto [low, high] = body.bounds();
+    Pcg32 random(2);
+    Eigen::Vector3d least = Eigen::Vector3d::Constant(9.0);
+    Eigen::Vector3d most = -least;
+    for (int i = 0; i < 20000; ++i) {
+      const Eigen::Vector3d away(random.normal(), random.normal(), random.normal());
+      // A point of the surface, as seen from far away; of a bar's axis any place will do.
+      Eigen::Vector3d far = 50.0 * away;
+      for (int axis = 0; axis < 3; ++axis)
+        if (std::isfinite(low[axis])) far[axis] += 0.5 * (low[axis] + high[axis]);
+      const Eigen::Vector3d near = body.nearest(far);
+      const Eigen::Vector3d point = near + body.radius * (far - near).normalized();
+      least = least.cwiseMin(point);
+      most = most.cwiseMax(point);
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      if (std::isinf(low[axis])) continue;
+      EXPECT_GE(least[axis], low[axis] - 1e-9);
+      EXPECT_LE(most[axis], high[axis] + 1e-9);
+      // Tight: within what random points leave.
+      EXPECT_NEAR(least[axis], low[axis], 0.01);
+      EXPECT_NEAR(most[axis], high[axis], 0.01);
+    }
   }
 }
 
@@ -207,7 +239,7 @@ TEST(BodyField, RefusesWhatIsNone) {
   EXPECT_TRUE(refused([&](BodyField& f) { f.bodies[0].radius = kNan; }));
   EXPECT_TRUE(refused([&](BodyField& f) { f.bodies[1].first.y() = kNan; }));
   EXPECT_TRUE(refused([](BodyField& f) { f.bodies[2].second.x() = 40.0; }));
-  EXPECT_TRUE(refused([](BodyField& f) { std::swap(f.bodies[3].first, f.bodies[3].second); }));
+  EXPECT_TRUE(refused([](BodyField& f) { std::swap(f.bodies[4].first, f.bodies[4].second); }));
   EXPECT_TRUE(refused(
       [](BodyField& f) { f.bodies[0].first.x() = -std::numeric_limits<double>::infinity(); }));
 }
