@@ -3,6 +3,7 @@
 #include "cli/commands/bench_fit.h"
 #include "cli/commands/bench_governor.h"
 #include "cli/commands/bench_latency.h"
+#include "cli/commands/bench_layers.h"
 #include "cli/commands/bench_query.h"
 #include "cli/commands/bench_render.h"
 #include "cli/commands/commands.h"
@@ -18,6 +19,7 @@ Result<int> run_bench(CommandLine& line) {
   btf::FitOptions fit;
   BenchGovernorOptions governor;
   BenchLatencyOptions latency;
+  BenchLayersOptions layers;
   CLI::App& app = line.app();
   app.add_option(
          "what",
@@ -25,9 +27,11 @@ Result<int> run_bench(CommandLine& line) {
          "render: what drawing a frame costs with each model; fit: what finding clusters in "
          "a basis gains; query: what asking for a pose costs; colour: how far each colour model is "
          "from invented projectors; latency: where the time from a pose to its light goes; "
-         "governor: how the deadline is held while a load comes and goes")
+         "governor: how the deadline is held while a load comes and goes; layers: what layered "
+         "gives "
+         "back of traced materials whose geometry is known")
       ->required()
-      ->check(CLI::IsMember({"colour", "fit", "governor", "latency", "query", "render"}));
+      ->check(CLI::IsMember({"colour", "fit", "governor", "latency", "layers", "query", "render"}));
   app.add_option("set",
                  set,
                  "The sample set, NAME.btfset; render takes a small synthetic one by itself, and "
@@ -90,7 +94,16 @@ Result<int> run_bench(CommandLine& line) {
                  "governor: threads of the load; 0: one for each processor")
       ->capture_default_str()
       ->check(CLI::Range(0, 256));
-  app.add_flag("--gate", governor.gate, "governor: exit with 3 where a gate is missed");
+  app.add_flag("--gate", governor.gate, "governor, layers: exit with 3 where a gate is missed");
+  app.add_option("--texels", layers.texels, "layers: texels along each side")
+      ->capture_default_str();
+  app.add_option("--directions", layers.directions, "layers: directions of view, and of light")
+      ->capture_default_str();
+  app.add_option("--samples", layers.samples, "layers: paths per texel and view")
+      ->capture_default_str();
+  app.add_option("--seeds", layers.seeds, "layers: materials of each kind")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100));
   line.parse();
   if (what == "render") {
     render.set = set;
@@ -107,6 +120,10 @@ Result<int> run_bench(CommandLine& line) {
   if (what == "latency") {
     if (size->count() > 0) latency.size = render.size;
     return bench_latency(latency, line);
+  }
+  if (what == "layers") {
+    layers.gate = governor.gate;
+    return bench_layers(layers, line);
   }
   if (what == "query") return bench_query(line);
   if (set.empty()) return fail(Errc::kInvalidOption, "bench fit: name a sample set, NAME.btfset");

@@ -22,9 +22,10 @@ Result<int> run_synthesize(CommandLine& line) {
   int lights = 81;
   simulation::SynthesisOptions options;
   std::string names;
-  for (const simulation::HeightFieldMaterial& material : simulation::height_field_materials()) {
+  for (const simulation::BodyMaterial& material : simulation::body_materials())
     names += fmt::format("{}, ", material.name);
-  }
+  for (const simulation::HeightFieldMaterial& material : simulation::height_field_materials())
+    names += fmt::format("{}, ", material.name);
   names += kPhong;
   line.app().add_option("material", name, "One of " + names)->required();
   line.app().add_option("-o,--output", out, "The sample set to write, NAME.btfset")->required();
@@ -45,6 +46,8 @@ Result<int> run_synthesize(CommandLine& line) {
   VENEER_ASSIGN(options.lights, simulation::ring_directions(lights));
   if (name == kPhong) {
     VENEER_TRY(simulation::synthesize_phong(out, options, line.progress()));
+  } else if (const simulation::BodyMaterial* bodies = simulation::find_body_material(name)) {
+    VENEER_TRY(simulation::synthesize(*bodies, out, options, line.progress()));
   } else {
     VENEER_ASSIGN(const simulation::HeightFieldMaterial* material,
                   simulation::find_height_field_material(name));

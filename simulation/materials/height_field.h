@@ -37,6 +37,9 @@ struct HeightField {
   [[nodiscard]] Status check() const;
 };
 
+/// How much finer than the texels a registered material's geometry is.
+inline constexpr int kCellsPerTexel = 4;
+
 /// A relief of `resolution` cells, all flat and of one surface.
 [[nodiscard]] HeightField flat_field(int resolution, const Surface& surface);
 

@@ -4,15 +4,18 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "simulation/materials/body_field.h"
 #include "simulation/materials/height_field.h"
 
 namespace veneer::simulation {
 
+[[nodiscard]] BodyField make_bars(int size, std::uint64_t seed);
 [[nodiscard]] HeightField make_cloth(int size, std::uint64_t seed);
 [[nodiscard]] HeightField make_corrugated(int size, std::uint64_t seed);
 [[nodiscard]] HeightField make_corrugated_print(int size, std::uint64_t seed);
 [[nodiscard]] HeightField make_hammered(int size, std::uint64_t seed);
 [[nodiscard]] HeightField make_leather(int size, std::uint64_t seed);
+[[nodiscard]] BodyField make_lichen(int size, std::uint64_t seed);
 [[nodiscard]] HeightField make_plaster(int size, std::uint64_t seed);
 
 /// Samples a material given as functions of the place (x, y) in tile widths, y downwards.

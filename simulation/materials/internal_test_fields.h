@@ -3,12 +3,14 @@
 
 #include <cmath>
 #include <numbers>
+#include <string_view>
 #include <vector>
 
 #include "base/progress.h"
 #include "btf/direction.h"
 #include "simulation/materials/height_field.h"
 #include "simulation/materials/internal_materials.h"
+#include "simulation/materials/synthesize.h"
 #include "simulation/materials/tracer.h"
 
 // What the tests of this folder share.
@@ -39,13 +41,10 @@ class TracedSet {
  public:
   TracedSet(const HeightField& field, const SynthesisOptions& options) : options_(options) {
     SilentProgress silent;
-    const Tracer tracer(field, options, silent);
-    stride_ = options.views.size() * options.lights.size() * 6;
-    samples_.resize(static_cast<std::size_t>(options.size * options.size) * stride_);
-    for (int texel = 0; texel < options.size * options.size; ++texel) {
-      tracer.trace(texel,
-                   std::span(samples_).subspan(static_cast<std::size_t>(texel) * stride_, stride_));
-    }
+    trace(Tracer(field, options, silent));
+  }
+  TracedSet(const BodyField& field, const SynthesisOptions& options) : options_(options) {
+    trace(Tracer(field, options));
   }
   [[nodiscard]] const std::vector<float>& samples() const { return samples_; }
   [[nodiscard]] double at(int texel,
@@ -66,9 +65,30 @@ class TracedSet {
   }
 
  private:
+  void trace(const Tracer& tracer) {
+    stride_ = options_.views.size() * options_.lights.size() * 6;
+    samples_.resize(static_cast<std::size_t>(options_.size * options_.size) * stride_);
+    for (int texel = 0; texel < options_.size * options_.size; ++texel) {
+      tracer.trace(texel,
+                   std::span(samples_).subspan(static_cast<std::size_t>(texel) * stride_, stride_));
+    }
+  }
+
   SynthesisOptions options_;
   std::size_t stride_ = 0;
   std::vector<float> samples_;
 };
+
+/// Traces every material there is. @param use  (std::string_view name, const TracedSet&)
+template <class Use>
+void for_each_material(int size,
+                       std::uint64_t seed,
+                       const SynthesisOptions& options,
+                       const Use& use) {
+  for (const auto& material : height_field_materials())
+    use(material.name, TracedSet(material.make(size, seed), options));
+  for (const auto& material : body_materials())
+    use(material.name, TracedSet(material.make(size, seed), options));
+}
 
 }  // namespace veneer::simulation

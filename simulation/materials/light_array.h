@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "btf/direction.h"
-#include "simulation/materials/relief.h"
+#include "simulation/materials/geometry.h"
 
 namespace veneer::simulation {
 

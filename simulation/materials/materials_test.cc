@@ -6,6 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "simulation/materials/layer_truth.h"
+#include "simulation/materials/solids.h"
 #include "simulation/materials/synthesize.h"
 
 namespace veneer::simulation {
@@ -24,6 +26,97 @@ TEST(Materials, AreFoundByNameAndOthersAreNot) {
   EXPECT_EQ(none.error().code, Errc::kInvalidOption);
   EXPECT_THAT(none.error().what,
               testing::HasSubstr("cloth, corrugated, corrugated-print, hammered, leather, plaster"));
+}
+
+TEST(BodyMaterials, AreFoundByNameAndHaveNamesOfTheirOwn) {
+  for (const auto& material : body_materials()) {
+    EXPECT_EQ(find_body_material(material.name), &material);
+    EXPECT_FALSE(find_height_field_material(material.name).has_value());
+  }
+  EXPECT_EQ(find_body_material("cloth"), nullptr);
+}
+
+TEST(BodyMaterials, AreValidAndTheSameTileAtEverySize) {
+  for (const auto& material : body_materials()) {
+    const BodyField one = material.make(1, 4);
+    for (const int size : {1, 7, kSize}) {
+      const BodyField field = material.make(size, 4);
+      EXPECT_EQ(field.resolution, size * kCellsPerTexel);
+      const Status status = field.check();
+      EXPECT_TRUE(status.has_value()) << material.name << ": " << status.error().what;
+      ASSERT_EQ(field.bodies.size(), one.bodies.size()) << material.name;
+      for (std::size_t i = 0; i < one.bodies.size(); ++i) {
+        EXPECT_EQ(field.bodies[i].first, one.bodies[i].first) << material.name << ' ' << i;
+        EXPECT_EQ(field.bodies[i].second, one.bodies[i].second) << material.name << ' ' << i;
+      }
+    }
+  }
+}
+
+// Seen from above, heights and colours step no more across the tile's edges than elsewhere.
+TEST(BodyMaterials, RepeatWithoutASeam) {
+  constexpr int kPlaces = 96;
+  for (const auto& material : body_materials()) {
+    const Solids solids(material.make(kPlaces / kCellsPerTexel, 1));
+    ASSERT_EQ(solids.resolution(), kPlaces);
+    std::vector<double> seen;
+    for (int i = 0; i < kPlaces * kPlaces; ++i) {
+      const auto hit = solids.first_hit({i % kPlaces + 0.5, i / kPlaces + 0.5, solids.top()},
+                                        -Eigen::Vector3d::UnitZ());
+      ASSERT_TRUE(hit.has_value());
+      seen.push_back(hit->z / kPlaces + solids.surface(*hit).albedo.mean());
+    }
+    for (const int step : {1, kPlaces}) {
+      std::vector<double> steps(kPlaces, 0.0);  // of each line to the next
+      for (int line = 0; line < kPlaces; ++line) {
+        for (int i = 0; i < kPlaces; ++i) {
+          const int across = kPlaces / step * i;  // i rows down, or i columns on
+          const auto at = [&](int l) {
+            return seen[static_cast<std::size_t>((l % kPlaces) * step + across)];
+          };
+          steps[static_cast<std::size_t>(line)] += std::abs(at(line + 1) - at(line));
+        }
+      }
+      const double at_seam = steps.back();
+      steps.pop_back();
+      EXPECT_LE(at_seam, 1.1 * *std::ranges::max_element(steps)) << material.name << ' ' << step;
+    }
+  }
+}
+
+TEST(BodyMaterials, DependOnTheSeed) {
+  for (const auto& material : body_materials()) {
+    const auto colour = [&](std::uint64_t seed) {
+      return material.make(kSize, seed).surface_at({0.31, 0.67, 0.0}, BodyField::kGround).albedo;
+    };
+    EXPECT_EQ(colour(1), colour(1)) << material.name;
+    EXPECT_NE(colour(1), colour(2)) << material.name;
+    EXPECT_NE(material.make(kSize, 1).bodies.front().first,
+              material.make(kSize, 2).bodies.front().first)
+        << material.name;
+  }
+}
+
+// What they are for: matter over air, which no height field holds.
+TEST(BodyMaterials, HoverAtTheirHeights) {
+  constexpr int kTexels = 64 * 64;
+  for (const auto& material : body_materials()) {
+    const BodyField field = material.make(kSize, 1);
+    const Solids solids(field);
+    const LayerTruth truth = layer_truth(field, 64, material.heights);
+    for (std::size_t layer = 0; layer + 1 < material.heights.size(); ++layer) {
+      int matter = 0;
+      int over_air = 0;
+      for (int i = 0; i < kTexels; ++i) {
+        if (truth.occupancy[layer * kTexels + static_cast<std::size_t>(i)] < 0.5F) continue;
+        ++matter;
+        over_air += solids.distance({(i % 64 + 0.5) / 64, (i / 64 + 0.5) / 64, 0.01}) > 0.0;
+      }
+      EXPECT_GT(matter, 0.08 * kTexels) << material.name << ' ' << layer;
+      EXPECT_LT(matter, 0.5 * kTexels) << material.name << ' ' << layer;
+      EXPECT_GT(over_air, 0.8 * matter) << material.name << ' ' << layer;
+    }
+  }
 }
 
 TEST(Materials, AreValidAtEverySize) {

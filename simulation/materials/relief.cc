@@ -48,7 +48,8 @@ double first_root(double a, double b, double c, double limit) {
 
 }  // namespace
 
-Relief::Relief(const HeightField& field) : resolution_(field.resolution) {
+Relief::Relief(const HeightField& field)
+    : resolution_(field.resolution), surfaces_(field.surfaces) {
   const int n = resolution_;
   const double mean =
       std::accumulate(field.heights.begin(), field.heights.end(), 0.0) / (double(n) * n);
@@ -139,6 +140,8 @@ Eigen::Vector3d Relief::normal(const Hit& hit) const {
   return Eigen::Vector3d(-(p.slope_u + p.twist * hit.v), -(p.slope_v + p.twist * hit.u), 1.0)
       .normalized();
 }
+
+Surface Relief::surface(const Hit& hit) const { return surfaces_[cell(hit.column, hit.row)]; }
 
 Eigen::Vector3d Relief::lifted(const Hit& hit, const Eigen::Vector3d& normal) const {
   return position(hit) + kLift * normal;

@@ -30,6 +30,51 @@ constexpr std::array kMaterials{
 };
 static_assert(std::ranges::is_sorted(kMaterials, {}, &HeightFieldMaterial::name));
 
+// What a set of a tile says of itself.
+btf::SampleSetInfo info_of(std::string_view name,
+                           double tile_width_mm,
+                           const SynthesisOptions& options) {
+  btf::SampleSetInfo info;
+  info.width = options.size;
+  info.height = options.size;
+  info.texel_pitch_mm = tile_width_mm / options.size;
+  info.polarised = true;
+  info.views = options.views;
+  info.lights = options.lights;
+  info.source = fmt::format("veneer synthesize {}: size {}, samples {}, bounces {}, seed {}",
+                            name,
+                            options.size,
+                            options.samples,
+                            options.bounces,
+                            options.seed);
+  info.licence = "computed from formulas; free of rights";
+  return info;
+}
+
+Status write_traced(const Tracer& tracer,
+                    std::string_view name,
+                    const SynthesisOptions& options,
+                    btf::SampleSetWriter& writer,
+                    Progress& progress) {
+  const std::size_t values = options.views.size() * options.lights.size() * 6;
+  progress.start(fmt::format("tracing {}", name), options.size);
+  parallel_for(options.size, 1, [&](std::int64_t begin, std::int64_t end) {
+    std::vector<float> samples(values);
+    for (auto row = static_cast<int>(begin); row < end; ++row) {
+      for (int column = 0; column < options.size; ++column) {
+        const int texel = row * options.size + column;
+        tracer.trace(texel, samples);
+        std::ranges::transform(samples, writer.texel(texel).begin(), [&](float sample) {
+          return writer.stored(sample);
+        });
+      }
+      progress.advance();
+    }
+  });
+  progress.finish(writer.clamped_remark());
+  return writer.finish();
+}
+
 }  // namespace
 
 std::span<const HeightFieldMaterial> height_field_materials() { return kMaterials; }
@@ -53,40 +98,25 @@ Status synthesize(const HeightFieldMaterial& material,
   VENEER_TRY(options.check());
   const HeightField field = material.make(options.size, options.seed);
   VENEER_TRY(field.check());
-
-  btf::SampleSetInfo info;
-  info.width = options.size;
-  info.height = options.size;
-  info.texel_pitch_mm = field.tile_width_mm / options.size;
-  info.polarised = true;
-  info.views = options.views;
-  info.lights = options.lights;
-  info.source = fmt::format("veneer synthesize {}: size {}, samples {}, bounces {}, seed {}",
-                            material.name,
-                            options.size,
-                            options.samples,
-                            options.bounces,
-                            options.seed);
-  info.licence = "computed from formulas; free of rights";
-  VENEER_ASSIGN(btf::SampleSetWriter writer, btf::SampleSetWriter::create(out, info));
-
+  VENEER_ASSIGN(
+      btf::SampleSetWriter writer,
+      btf::SampleSetWriter::create(out, info_of(material.name, field.tile_width_mm, options)));
   const Tracer tracer(field, options, progress);
-  progress.start(fmt::format("tracing {}", material.name), options.size);
-  parallel_for(options.size, 1, [&](std::int64_t begin, std::int64_t end) {
-    std::vector<float> samples(static_cast<std::size_t>(info.pair_count() * info.channel_count()));
-    for (auto row = static_cast<int>(begin); row < end; ++row) {
-      for (int column = 0; column < options.size; ++column) {
-        const int texel = row * options.size + column;
-        tracer.trace(texel, samples);
-        std::ranges::transform(samples, writer.texel(texel).begin(), [&](float sample) {
-          return writer.stored(sample);
-        });
-      }
-      progress.advance();
-    }
-  });
-  progress.finish(writer.clamped_remark());
-  return writer.finish();
+  return write_traced(tracer, material.name, options, writer, progress);
+}
+
+Status synthesize(const BodyMaterial& material,
+                  const std::filesystem::path& out,
+                  const SynthesisOptions& options,
+                  Progress& progress) {
+  VENEER_TRY(options.check());
+  const BodyField field = material.make(options.size, options.seed);
+  VENEER_TRY(field.check());
+  VENEER_ASSIGN(
+      btf::SampleSetWriter writer,
+      btf::SampleSetWriter::create(out, info_of(material.name, field.tile_width_mm, options)));
+  const Tracer tracer(field, options);
+  return write_traced(tracer, material.name, options, writer, progress);
 }
 
 }  // namespace veneer::simulation

@@ -8,12 +8,13 @@
 
 #include "base/progress.h"
 #include "base/result.h"
+#include "simulation/materials/body_materials.h"
 #include "simulation/materials/height_field.h"
 #include "simulation/materials/synthesis_options.h"
 
 namespace veneer::simulation {
 
-/// One line of the registry of synthetic materials.
+/// One line of the registry of synthetic materials that are height fields.
 struct HeightFieldMaterial {
   std::string_view name;
   std::string_view summary;
@@ -22,9 +23,6 @@ struct HeightFieldMaterial {
   /// @param size  texels along each side of the set, > 0; the relief is kCellsPerTexel times finer.
   HeightField (*make)(int size, std::uint64_t seed);
 };
-
-/// How much finer than the texels a registered material's relief is.
-inline constexpr int kCellsPerTexel = 4;
 
 /// Every material, sorted by name.
 [[nodiscard]] std::span<const HeightFieldMaterial> height_field_materials();
@@ -36,6 +34,11 @@ inline constexpr int kCellsPerTexel = 4;
 /// same options give the same samples on any number of threads. Nothing is left behind by a
 /// failure. Errors: kInvalidOption, kIo.
 [[nodiscard]] Status synthesize(const HeightFieldMaterial& material,
+                                const std::filesystem::path& out,
+                                const SynthesisOptions& options,
+                                Progress& progress);
+/// Likewise. Every shadow is a ray here, so that a path costs about as many as there are lights.
+[[nodiscard]] Status synthesize(const BodyMaterial& material,
                                 const std::filesystem::path& out,
                                 const SynthesisOptions& options,
                                 Progress& progress);

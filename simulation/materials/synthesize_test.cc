@@ -52,6 +52,8 @@ HeightField make_broken(int size, std::uint64_t) {
 }
 const HeightFieldMaterial kWhite{"white", "flat white Lambert", &make_white};
 const HeightFieldMaterial kBroken{"broken", "a NaN for a height", &make_broken};
+BodyField make_thin_air(int, std::uint64_t) { return {}; }
+const BodyMaterial kThinAir{"thin-air", "nothing at all", &make_thin_air, {}};
 
 std::string bytes_of(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
@@ -90,17 +92,20 @@ TEST_F(SynthesizeTest, WritesAPolarisedSetInTheUnitOfASample) {
 
 TEST_F(SynthesizeTest, EveryMaterialIsFiniteAndNotBlack) {
   SilentProgress silent;
-  for (const auto& material : height_field_materials()) {
+  const auto check = [&](const auto& material) {
     const fs::path out = folder_ / material.name;
     const Status status = synthesize(material, out, quick_options(), silent);
     ASSERT_TRUE(status.has_value()) << material.name << ": " << status.error().what;
     const auto set = btf::SampleSet::open(out);
     ASSERT_TRUE(set.has_value()) << material.name;
+    EXPECT_THAT(set->info().source, testing::HasSubstr(std::string(material.name)));
     const Status finite = set->check_finite();
     EXPECT_TRUE(finite.has_value()) << material.name << ": " << finite.error().what;
     EXPECT_GT(static_cast<float>(set->stored(0)[3]) + static_cast<float>(set->stored(0)[0]), 0.0F)
         << material.name;
-  }
+  };
+  std::ranges::for_each(height_field_materials(), check);
+  std::ranges::for_each(body_materials(), check);
 }
 
 // Run by the test below in processes of their own, since the number of threads is read once.
@@ -183,6 +188,8 @@ TEST_F(SynthesizeTest, RefusesEqualDirectionsAndBrokenMaterialsAndLeavesNothingB
   EXPECT_FALSE(synthesize(kWhite, folder_ / "bad.btfset", twice, silent).has_value());
   EXPECT_FALSE(left_behind());
   EXPECT_FALSE(synthesize(kBroken, folder_ / "bad.btfset", quick_options(), silent).has_value());
+  EXPECT_FALSE(left_behind());
+  EXPECT_FALSE(synthesize(kThinAir, folder_ / "bad.btfset", quick_options(), silent).has_value());
   EXPECT_FALSE(left_behind());
 }
 

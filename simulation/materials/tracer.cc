@@ -8,6 +8,8 @@
 #include "base/random.h"
 #include "base/result.h"
 #include "simulation/materials/microfacet.h"
+#include "simulation/materials/relief.h"
+#include "simulation/materials/solids.h"
 
 namespace veneer::simulation {
 
@@ -74,38 +76,47 @@ void add_interface(const LightArray& lights,
   }
 }
 
-// Two axes that complete a unit vector with z > -1 to a right-handed frame.
-// Source: Duff et al. 2017, "Building an Orthonormal Basis, Revisited", JCGT 6(1), for z > 0.
+// Two axes that complete a unit vector to a right-handed frame.
+// Source: Duff et al. 2017, "Building an Orthonormal Basis, Revisited", JCGT 6(1).
 void complete_basis(const Eigen::Vector3d& n,
                     Eigen::Vector3d& tangent,
                     Eigen::Vector3d& bitangent) {
-  const double a = -1.0 / (1.0 + n.z());
+  const double sign = std::copysign(1.0, n.z());
+  const double a = -1.0 / (sign + n.z());
   const double b = n.x() * n.y() * a;
-  tangent = {1.0 + n.x() * n.x() * a, b, -n.x()};
-  bitangent = {b, 1.0 + n.y() * n.y() * a, -n.y()};
+  tangent = {1.0 + sign * n.x() * n.x() * a, sign * b, -sign * n.x()};
+  bitangent = {b, sign + n.y() * n.y() * a, -n.y()};
 }
 
 }  // namespace
 
 // A point of a path, as seen from the point before it.
 struct Tracer::Vertex {
-  Relief::Hit hit;
-  const Surface* surface;
+  Geometry::Hit hit;
+  Surface surface;
   Eigen::Vector3d normal, view;
   Eigen::Vector3f throughput;  // of the path up to here
 };
 
-Tracer::Tracer(const HeightField& field, const SynthesisOptions& options, Progress& progress)
-    : options_(options), relief_(field), surfaces_(field.surfaces), lights_(options.lights) {
+Tracer::Tracer(std::shared_ptr<const Geometry> geometry, const SynthesisOptions& options)
+    : options_(options), geometry_(std::move(geometry)), lights_(options.lights) {
   for (const btf::Direction& view : options.views) views_.push_back(grid_from_local(view));
-  if (!options.exact_shadows) shadows_.emplace(relief_, lights_, progress);
 }
+
+Tracer::Tracer(const HeightField& field, const SynthesisOptions& options, Progress& progress)
+    : Tracer(std::make_shared<Relief>(field), options) {
+  if (!options.exact_shadows)
+    shadows_.emplace(static_cast<const Relief&>(*geometry_), lights_, progress);
+}
+
+Tracer::Tracer(const BodyField& field, const SynthesisOptions& options)
+    : Tracer(std::make_shared<Solids>(field), options) {}
 
 void Tracer::trace(int texel, std::span<float> out) const {
   const std::size_t lights = lights_.count;
   VENEER_CHECK(out.size() == views_.size() * lights * 6);
   Pcg32 random(options_.seed, static_cast<std::uint64_t>(texel));
-  const double cells_per_texel = static_cast<double>(relief_.resolution()) / options_.size;
+  const double cells_per_texel = static_cast<double>(geometry_->resolution()) / options_.size;
   const int column = texel % options_.size;
   const int row = texel / options_.size;
   Film film;
@@ -136,23 +147,20 @@ void Tracer::trace_path(const Eigen::Vector3d& place,
                         Numbers numbers,
                         Pcg32& random,
                         Film& film) const {
-  Eigen::Vector3d from = place + view * ((relief_.top() - place.z()) / view.z());
+  Eigen::Vector3d from = place + view * ((geometry_->top() - place.z()) / view.z());
   Eigen::Vector3d direction = -view;
   Eigen::Vector3f throughput = Eigen::Vector3f::Ones();
   bool in_body = false;
   for (int depth = 0;; ++depth) {
-    const auto hit = relief_.first_hit(from, direction);
+    const auto hit = geometry_->first_hit(from, direction);
     if (!hit) return;
-    const std::size_t cell =
-        static_cast<std::size_t>(hit->row) * static_cast<std::size_t>(relief_.resolution()) +
-        static_cast<std::size_t>(hit->column);
-    Vertex vertex{*hit, &surfaces_[cell], relief_.normal(*hit), -direction, throughput};
+    Vertex vertex{*hit, geometry_->surface(*hit), geometry_->normal(*hit), -direction, throughput};
     if (vertex.normal.dot(vertex.view) < kMinCosine) return;
     add_direct_light(vertex, in_body, film);
     if (depth == options_.bounces || !scatter(vertex, in_body, direction, numbers)) return;
     for (double& number : numbers) number = random.uniform();
     throughput = vertex.throughput;
-    from = relief_.lifted(vertex.hit, vertex.normal);
+    from = geometry_->lifted(vertex.hit, vertex.normal);
   }
 }
 
@@ -160,10 +168,10 @@ void Tracer::light_shares(const Vertex& vertex, std::span<float> lit) const {
   if (shadows_) {
     shadows_->look_up(vertex.hit, lit);
   } else {
-    const Eigen::Vector3d from = relief_.lifted(vertex.hit, vertex.normal);
+    const Eigen::Vector3d from = geometry_->lifted(vertex.hit, vertex.normal);
     for (std::size_t i = 0; i < lights_.count; ++i) {
       const Eigen::Vector3d to_light = lights_.direction(i);
-      const bool dark = vertex.normal.dot(to_light) <= 0.0 || relief_.first_hit(from, to_light);
+      const bool dark = vertex.normal.dot(to_light) <= 0.0 || geometry_->first_hit(from, to_light);
       lit[i] = dark ? 0.0F : 1.0F;
     }
   }
@@ -176,7 +184,7 @@ void Tracer::light_shares(const Vertex& vertex, std::span<float> lit) const {
 }
 
 void Tracer::add_direct_light(const Vertex& vertex, bool in_body, Film& film) const {
-  const Surface& surface = *vertex.surface;
+  const Surface& surface = vertex.surface;
   // One per thread, so that a path allocates nothing.
   thread_local std::vector<float> lit;
   lit.assign(lights_.padded(), 0.0F);
@@ -217,7 +225,7 @@ bool Tracer::scatter(Vertex& vertex,
                      bool& in_body,
                      Eigen::Vector3d& direction,
                      const Numbers& numbers) const {
-  const Surface& surface = *vertex.surface;
+  const Surface& surface = vertex.surface;
   const auto cos_v = std::min(1.0F, static_cast<float>(vertex.normal.dot(vertex.view)));
   const Eigen::Vector3f mirrored = fresnel(surface.f0, cos_v);
   const Eigen::Vector3f seen = Eigen::Vector3f::Ones() - mirrored;

@@ -2,14 +2,16 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "base/progress.h"
+#include "simulation/materials/body_field.h"
+#include "simulation/materials/geometry.h"
 #include "simulation/materials/height_field.h"
 #include "simulation/materials/light_array.h"
-#include "simulation/materials/relief.h"
 #include "simulation/materials/shadow_table.h"
 #include "simulation/materials/synthesis_options.h"
 
@@ -19,12 +21,12 @@ class Pcg32;
 
 namespace veneer::simulation {
 
-/// Traces paths from the eye into a height field and connects each of their vertices to every
-/// light.
+/// Traces paths from the eye into a material and connects each of their vertices to every light.
 ///
-/// The picture of a view is the rectified picture of the mean plane: the ray of a place in a texel
-/// runs through that place of the plane at mean height, along the view, and sees what it meets
-/// first on its way down from above the relief. Masking and parallax are in the samples.
+/// The picture of a view is the rectified picture of the reference plane: the ray of a place in a
+/// texel runs through that place of the plane (a height field's mean height), along the view, and
+/// sees what it meets first on its way down from above everything. Masking and parallax are in the
+/// samples.
 ///
 /// Parts: *specular* is light that was reflected by interfaces only, once or several times;
 /// *diffuse* is light that was in the body, and so depolarised, at least once on its way. A chain
@@ -37,6 +39,8 @@ class Tracer {
  public:
   /// @param field, options  valid; the field may have any resolution.
   Tracer(const HeightField& field, const SynthesisOptions& options, Progress& progress);
+  /// Bodies have no table of shadows: every shadow is a ray of its own.
+  Tracer(const BodyField& field, const SynthesisOptions& options);
 
   /// All samples of a texel: pi * radiance for unit irradiance facing the light.
   /// @param texel  row by row, in [0, size^2)
@@ -62,12 +66,13 @@ class Tracer {
                              const Numbers& numbers) const;
   void light_shares(const Vertex& vertex, std::span<float> lit) const;
 
+  Tracer(std::shared_ptr<const Geometry> geometry, const SynthesisOptions& options);
+
   SynthesisOptions options_;
-  Relief relief_;
-  std::vector<Surface> surfaces_;
+  std::shared_ptr<const Geometry> geometry_;
   LightArray lights_;
   std::vector<Eigen::Vector3d> views_;  // grid frame
-  std::optional<ShadowTable> shadows_;  // unless exact
+  std::optional<ShadowTable> shadows_;  // of a relief, unless exact
 };
 
 }  // namespace veneer::simulation

@@ -252,8 +252,7 @@ TEST(Energy, NoMaterialSendsMoreThanItGets) {
   options.bounces = 4;
   constexpr double kTolerance =
       0.02;  // quadrature of a lobe of alpha 0.22 over 128 views, and noise
-  for (const auto& material : height_field_materials()) {
-    const TracedSet set(material.make(8, 1), options);
+  for_each_material(8, 1, options, [&](std::string_view name, const TracedSet& set) {
     for (std::size_t light = 0; light < options.lights.size(); ++light) {
       for (std::size_t colour = 0; colour < 3; ++colour) {
         double sum = 0.0;
@@ -261,11 +260,11 @@ TEST(Energy, NoMaterialSendsMoreThanItGets) {
           sum += set.mean(view, light, colour);
         const double share =
             sum / static_cast<double>(options.views.size()) / options.lights[light].z();
-        EXPECT_LE(share, 1.0 + kTolerance) << material.name << ' ' << light << ' ' << colour;
-        EXPECT_GT(share, 0.01) << material.name << ' ' << light << ' ' << colour;
+        EXPECT_LE(share, 1.0 + kTolerance) << name << ' ' << light << ' ' << colour;
+        EXPECT_GT(share, 0.01) << name << ' ' << light << ' ' << colour;
       }
     }
-  }
+  });
 }
 
 TEST(ShadowTable, AgreesWithTracedShadows) {
@@ -369,13 +368,93 @@ TEST(Grazing, ViewsAndLightsGiveFiniteNonNegativeSamples) {
   const btf::DirectionSet grazing{toward(75, 0), toward(89, 0), toward(89, 180), toward(89.8, 77)};
   SynthesisOptions options = options_for(4, grazing, grazing);
   options.bounces = 4;
-  for (const auto& material : height_field_materials()) {
-    const TracedSet set(material.make(4, 1), options);
+  for_each_material(4, 1, options, [](std::string_view name, const TracedSet& set) {
     EXPECT_TRUE(std::ranges::all_of(set.samples(), [](float s) {
       return std::isfinite(s) && s >= 0.0F;
-    })) << material.name;
-    EXPECT_GT(*std::ranges::max_element(set.samples()), 0.0F) << material.name;
+    })) << name;
+    EXPECT_GT(*std::ranges::max_element(set.samples()), 0.0F) << name;
+  });
+}
+
+// White bodies in a white furnace: what does not come back at once comes back later, also from
+// undersides and through the gaps.
+TEST(Bodies, OfWhiteLambertLoseNothing) {
+  SynthesisOptions options = options_for(4, {}, {toward(30, 40)});
+  for (int i = 0; i < 6; ++i) {
+    const double theta_deg = std::asin(std::sqrt((i + 0.5) / 6.0)) * 180.0 / kPi;
+    for (int k = 0; k < 12; ++k) options.views.push_back(toward(theta_deg, 30.0 * k + 7.0));
   }
+  options.samples = 64;
+  options.bounces = 48;
+  for (const auto& material : body_materials()) {
+    BodyField field = material.make(4, 1);
+    field.surface_at = [](const Eigen::Vector3d&, int) { return white_lambert(); };
+    const TracedSet set(field, options);
+    double sum = 0.0;
+    for (std::size_t view = 0; view < options.views.size(); ++view) sum += set.mean(view, 0, 0);
+    const double share = sum / static_cast<double>(options.views.size()) / options.lights[0].z();
+    EXPECT_NEAR(share, 1.0, 0.02) << material.name;  // 72 views, 73,728 paths
+  }
+}
+
+TEST(Bodies, AreReciprocalInTheTilesMean) {
+  const btf::DirectionSet directions{
+      toward(5, 10), toward(40, 100), toward(65, 200), toward(75, 350)};
+  SynthesisOptions options = options_for(8, directions, directions);
+  options.samples = 256;
+  for (const auto& material : body_materials()) {
+    const TracedSet set(material.make(8, 3), options);
+    constexpr double kNoise = 0.03;  // relative
+    for (std::size_t a = 0; a < directions.size(); ++a) {
+      for (std::size_t b = 0; b < a; ++b) {
+        const double there = set.mean(a, b, 0) / directions[b].z();
+        const double back = set.mean(b, a, 0) / directions[a].z();
+        EXPECT_NEAR(there, back, kNoise * there) << material.name << ' ' << a << ' ' << b;
+      }
+    }
+  }
+}
+
+// A plate that hovers at z over a white ground, seen and lit along the normal and aslant: it stands
+// z tan(theta) off, and so does its shadow; under it light comes through.
+TEST(Bodies, HoverWithParallaxAndACastShadow) {
+  constexpr int kSize = 32;
+  constexpr double kHeight = 0.2;
+  constexpr double kHalfWidth = 0.1;
+  BodyField field;
+  field.resolution = kSize;
+  field.bodies = {endless_bar(false, 0.5, kHeight, kHalfWidth, 1e-3, 5e-4)};
+  field.surface_at = [](const Eigen::Vector3d&, int body) {
+    Surface surface = white_lambert();
+    if (body != BodyField::kGround) surface.albedo.setZero();
+    return surface;
+  };
+  SynthesisOptions options =
+      options_for(kSize, {toward(0, 0), toward(45, 180)}, {toward(0, 0), toward(45, 0)});
+  options.bounces = 0;
+  options.samples = 64;
+  const TracedSet set(field, options);
+  // What is dark: the plate, and where it hides the light, as shares of the tile's width.
+  const auto dark = [&](std::size_t view, std::size_t light, double low, double high) {
+    double sum = 0.0;
+    for (int column = 0; column < kSize; ++column)
+      if ((column + 0.5) / kSize > low && (column + 0.5) / kSize < high)
+        sum += 1.0 - set.at(5 * kSize + column, view, light, 3) / options.lights[light].z();
+    return sum / kSize;
+  };
+  constexpr double kNoise = 0.005;
+  constexpr double kColumn = 0.25 / kSize;  // where a window ends within a texel
+  const double width = 2.0 * kHalfWidth;
+  EXPECT_NEAR(dark(0, 0, 0.35, 0.65), width, kNoise);
+  EXPECT_NEAR(dark(0, 0, 0.0, 1.0), width, kNoise);
+  // From -x: the ground plane's point behind it is moved to +x.
+  EXPECT_NEAR(dark(1, 0, 0.60, 0.85), width, kColumn);
+  // The shadow under a vertical light stays at 0.5, and shows beside the plate.
+  EXPECT_NEAR(dark(1, 0, 0.35, 0.60), width, kColumn);
+  EXPECT_NEAR(dark(1, 0, 0.0, 1.0), 2.0 * width, 2.0 * kNoise);
+  // Lit from +x the shadow falls to -x, and both are seen.
+  EXPECT_NEAR(dark(0, 1, 0.15, 0.40), width, kColumn);
+  EXPECT_NEAR(dark(0, 1, 0.0, 1.0), 2.0 * width, 2.0 * kNoise);
 }
 
 }  // namespace
