@@ -15,6 +15,7 @@
 #include "base/parallel.h"
 #include "base/random.h"
 #include "base/statistics.h"
+#include "btf/mapped_material.h"
 
 namespace veneer::btf {
 namespace {
@@ -88,6 +89,7 @@ Result<ComparedPairs> match(const SampleSet& set,
                             const PairWeights* weights) {
   const SampleSetInfo& info = set.info();
   const std::string doing = fmt::format("evaluating a material on {}", set.path().string());
+  VENEER_TRY(refuse_texel_map(material, Errc::kBadFormat, doing));
   if (material.width() != info.width || material.height() != info.height)
     return fail(Errc::kBadFormat,
                 "{}: the material has {} x {} texels, the set {} x {}; fit it on this set",

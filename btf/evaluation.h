@@ -37,8 +37,8 @@ struct Evaluation {
 /// A material that keeps some of the set's directions (FitOptions::region) is compared there.
 /// @param weights  how much each pair of the set counts, null: all of the material's alike. Of
 /// pairs without weight nothing is told.
-/// Errors: kBadFormat where the material has another size, directions that the set has not, or
-/// lacks some that have a weight, or where one of them holds NaN or infinite values;
+/// Errors: kBadFormat where the material has another size or a texel map, directions that the set
+/// has not, or lacks some that have a weight, or where one of them holds NaN or infinite values;
 /// kInvalidOption of PairWeights::check().
 [[nodiscard]] Result<Evaluation> evaluate(const SampleSet& set,
                                           const Material& material,

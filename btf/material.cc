@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 
+#include "btf/mapped_material.h"
 #include "btf/models/components.h"
 #include "btf/models/dichromatic_lpca/dichromatic_lpca.h"
 #include "btf/models/eigen_texture/eigen_texture.h"
@@ -155,6 +156,17 @@ Result<const Model*> find_model(std::string_view name) {
   return fail(Errc::kInvalidOption, "there is no model \"{}\"; the models are {}", name, names);
 }
 
+Eigen::Vector3d Material::radiance_on(const TexelMap& map,
+                                      int place,
+                                      const Direction& view,
+                                      const Direction& light) const {
+  return radiance(map.source_texel(place), view, light);
+}
+
+void Material::reconstruct_on(const TexelMap& map, int place, std::span<float> rgb) const {
+  reconstruct(map.source_texel(place), rgb);
+}
+
 Status save_material(const Material& material,
                      const std::filesystem::path& path,
                      const std::map<std::string, std::string>& provenance) {
@@ -219,7 +231,12 @@ Result<std::unique_ptr<Material>> load_material(const std::filesystem::path& pat
   VENEER_ASSIGN(const std::string name, file.meta("model"));
   const auto model = find_model(name);
   if (!model) return fail(Errc::kBadFormat, "reading {}: {}", path.string(), model.error().what);
-  return (*model)->load(file);
+  VENEER_ASSIGN(std::unique_ptr<Material> material, (*model)->load(file));
+  VENEER_ASSIGN(std::optional<TexelMap> map, read_texel_map(file, *material));
+  if (!map) return material;
+  auto mapped = with_texel_map(std::move(material), std::move(*map));
+  if (!mapped) return fail(Errc::kBadFormat, "reading {}: {}", path.string(), mapped.error().what);
+  return mapped;
 }
 
 }  // namespace veneer::btf

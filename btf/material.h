@@ -23,6 +23,7 @@
 namespace veneer::btf {
 
 struct FitRegion;
+class TexelMap;
 
 /// Heights above the reference plane of a sample set, in texels. lowest < highest, unless there is
 /// one layer only.
@@ -110,6 +111,16 @@ class Material {
                                                          const Direction& light) const {
     return radiance(texel, view, light);
   }
+  /// Where the material is larger than its sample, which texel of it each place shows
+  /// (mapped_material.h); null: it is the sample itself.
+  [[nodiscard]] virtual const TexelMap* texel_map() const { return nullptr; }
+  /// radiance() and reconstruct() of a place of a map over this material. Models that look at more
+  /// than one texel find the others by moving on the map.
+  [[nodiscard]] virtual Eigen::Vector3d radiance_on(const TexelMap& map,
+                                                    int place,
+                                                    const Direction& view,
+                                                    const Direction& light) const;
+  virtual void reconstruct_on(const TexelMap& map, int place, std::span<float> rgb) const;
   [[nodiscard]] virtual ModelShader shader() const = 0;
   /// Numbers kept for one texel, whatever their precision, with a texel's share of what clusters
   /// have in common; what a whole set shares is not counted (Meseth et al. 2003, Table 2).

@@ -12,6 +12,7 @@ std::size_t bytes_per_texel(TexelFormat format) {
     case TexelFormat::kR16ui:
     case TexelFormat::kR16f:
       return 2;
+    case TexelFormat::kRg16ui:
     case TexelFormat::kRgba8:
     case TexelFormat::kRgba8Snorm:
     case TexelFormat::kRg16f:

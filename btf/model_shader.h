@@ -14,6 +14,7 @@ enum class TextureKind { k2D, k2DArray, k3D };
 enum class TexelFormat {
   kR8ui,
   kR16ui,
+  kRg16ui,
   kRgba16ui,
   kRgba32ui,
   kRgba8,
@@ -72,10 +73,10 @@ struct ShellLayers {
 
 /// What the renderer needs to draw a material: GLSL that defines
 /// `vec3 btf_radiance(vec2 uv, vec3 view, vec3 light)` in the sample's unit, and its textures.
-/// `uv` is in repeats of the sample (uv.x = 1 is one width to the right), `view` and `light` are
-/// unit vectors in the local frame; view.z may be slightly below 0 at silhouettes. Of a material
-/// with mip levels (Material::mip_levels) the source declares `int texel_level`, the level that is
-/// read, which is 0 until it is set.
+/// `uv` is in repeats of the material (uv.x = 1 is one width() to the right), `view` and `light`
+/// are unit vectors in the local frame; view.z may be slightly below 0 at silhouettes. Of a
+/// material with mip levels (Material::mip_levels) the source declares `int texel_level`, the level
+/// that is read, which is 0 until it is set.
 ///
 /// Who draws may define SPECULAR_WEIGHT before the source, an expression in 0 to 1. A model whose
 /// specular part is a term of its own (Material::has_specular_term()) multiplies it by that, in
@@ -84,7 +85,10 @@ struct ShellLayers {
 struct ModelShader {
   std::string source;  ///< constants first, no #version
   std::vector<ModelTexture> textures;
-  int fetches = 0;                                   ///< texture fetches for one call
+  int fetches = 0;  ///< texture fetches for one call
+  /// Of one call: how many texels the model asks for, each of which a texel map (mapped_material.h)
+  /// has to be read for.
+  int texels_read = 1;
   std::optional<EigenCache> cache = std::nullopt;    ///< for models that offer it
   std::optional<ShellLayers> shells = std::nullopt;  ///< for models that offer it
   [[nodiscard]] std::size_t gpu_bytes() const;

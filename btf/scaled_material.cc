@@ -36,6 +36,16 @@ class ScaledMaterial final : public Material {
                            const Direction& light) const override {
     return scale_ * stored_->radiance(texel, view, light);
   }
+  Eigen::Vector3d radiance_on(const TexelMap& map,
+                              int place,
+                              const Direction& view,
+                              const Direction& light) const override {
+    return scale_ * stored_->radiance_on(map, place, view, light);
+  }
+  void reconstruct_on(const TexelMap& map, int place, std::span<float> rgb) const override {
+    stored_->reconstruct_on(map, place, rgb);
+    for (float& value : rgb) value *= static_cast<float>(scale_);
+  }
   Eigen::Vector3d diffuse_radiance(int texel,
                                    const Direction& view,
                                    const Direction& light) const override {

@@ -10,6 +10,7 @@
 #include <optional>
 #include <utility>
 
+#include "btf/mapped_material.h"
 #include "render/compensate_pass.h"
 #include "render/draw_pass.h"
 #include "render/draw_target.h"
@@ -330,6 +331,8 @@ Status RenderBenchOptions::check() const {
   if (reference != nullptr) {
     for (const RenderBenchMaterial& m : materials) {
       const btf::SampleSetInfo& info = reference->set().info();
+      VENEER_TRY(btf::refuse_texel_map(
+          *m.material, Errc::kInvalidOption, fmt::format("timing {} beside its set", m.name)));
       if (m.material->width() != info.width || m.material->height() != info.height)
         return fail(Errc::kInvalidOption,
                     "timing: {} has {} x {} texels and the set {} x {}; fit it on this set",

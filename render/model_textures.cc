@@ -23,6 +23,8 @@ GlFormat gl_format(TexelFormat format) {
       return {GL_R8UI, GL_RED_INTEGER, GL_UNSIGNED_BYTE, true};
     case TexelFormat::kR16ui:
       return {GL_R16UI, GL_RED_INTEGER, GL_UNSIGNED_SHORT, true};
+    case TexelFormat::kRg16ui:
+      return {GL_RG16UI, GL_RG_INTEGER, GL_UNSIGNED_SHORT, true};
     case TexelFormat::kRgba16ui:
       return {GL_RGBA16UI, GL_RGBA_INTEGER, GL_UNSIGNED_SHORT, true};
     case TexelFormat::kRgba32ui:

@@ -28,6 +28,11 @@ int wrapped(int value, int size) {
   return rest < 0 ? rest + size : rest;
 }
 
+// The texel that a place shows.
+int shown(int place, const TexelMap* map) {
+  return map != nullptr ? map->source_texel(place) : place;
+}
+
 // What is wrong with a stored point, or nothing.
 std::string_view fault_of(std::span<const Eigen::half> values, bool is_top, bool is_lowest) {
   const auto value = [values](std::size_t i) { return static_cast<float>(values[i]); };
@@ -111,18 +116,23 @@ Eigen::Vector2i LayerStack::steps(double rise, const Direction& direction) {
           static_cast<int>(std::floor(-shift * direction.y() + 0.5))};
 }
 
-int LayerStack::moved(int texel, const Eigen::Vector2i& steps) const {
-  const int column = wrapped(texel % width_ + steps.x(), width_);
-  const int row = wrapped(texel / width_ + steps.y(), height_);
-  return row * width_ + column;
+int LayerStack::moved(int texel, const Eigen::Vector2i& steps, const TexelMap* map) const {
+  const int width = map != nullptr ? map->width() : width_;
+  const int height = map != nullptr ? map->height() : height_;
+  const int column = wrapped(texel % width + steps.x(), width);
+  const int row = wrapped(texel / width + steps.y(), height);
+  return row * width + column;
 }
 
-double LayerStack::arriving(int layer, int texel, const Direction& light) const {
+double LayerStack::arriving(int layer,
+                            int texel,
+                            const Direction& light,
+                            const TexelMap* map) const {
   double share = 1.0;
   for (int above = layer - 1; above >= 0 && share > 0.0; --above) {
     const double rise =
         heights_[static_cast<std::size_t>(above)] - heights_[static_cast<std::size_t>(layer)];
-    share *= transmittance(above, moved(texel, steps(rise, light)));
+    share *= transmittance(above, shown(moved(texel, steps(rise, light), map), map));
   }
   return share;
 }
@@ -130,14 +140,15 @@ double LayerStack::arriving(int layer, int texel, const Direction& light) const 
 Eigen::Vector3d LayerStack::layer_radiance(int layer,
                                            int texel,
                                            const Direction& view,
-                                           const Direction& light) const {
-  const auto values = stored(layer, texel);
+                                           const Direction& light,
+                                           const TexelMap* map) const {
+  const auto values = stored(layer, shown(texel, map));
   const double cosine = colour_at(values.subspan<kNormal>(), 0).dot(light);
   if (!(cosine > 0.0)) return Eigen::Vector3d::Zero();
   const std::array<Eigen::half, kLobeValues> lobe{
       values[kLobe], values[kLobe + 1], values[kLobe + 2], values[kExponent]};
   const double arrived =
-      arriving(layer, texel, light) + static_cast<float>(values[kDiffuseRadiance]);
+      arriving(layer, texel, light, map) + static_cast<float>(values[kDiffuseRadiance]);
   return (arrived * cosine) *
          (colour_at(values.subspan<kDiffuse>(), 0) +
           lobe_value(lobe, view.cwiseProduct(light)) * colour_at(values.subspan<kSpecular>(), 0));
@@ -145,15 +156,16 @@ Eigen::Vector3d LayerStack::layer_radiance(int layer,
 
 Eigen::Vector3d LayerStack::radiance(int texel,
                                      const Direction& view,
-                                     const Direction& light) const {
+                                     const Direction& light,
+                                     const TexelMap* map) const {
   Eigen::Vector3d seen = Eigen::Vector3d::Zero();
   if (!(light.z() > 0.0)) return seen;
   const Direction above{view.x(), view.y(), std::max(view.z(), 0.0)};
   double visible = 1.0;
   for (int layer = 0; layer < layer_count() && visible > 0.0; ++layer) {
-    const int place = met(texel, layer, above);
-    seen += visible * layer_radiance(layer, place, above, light);
-    visible *= transmittance(layer, place);
+    const int place = met(texel, layer, above, map);
+    seen += visible * layer_radiance(layer, place, above, light, map);
+    visible *= transmittance(layer, shown(place, map));
   }
   return seen;
 }

@@ -10,6 +10,7 @@
 #include "base/safetensors.h"
 #include "btf/material.h"
 #include "btf/models/material_tensors.h"
+#include "btf/texel_map.h"
 
 namespace veneer::btf {
 
@@ -63,23 +64,37 @@ class LayerStack {
   /// By how many columns and rows a ray along `direction` moves while it rises by `rise` texels,
   /// from the middle of a texel to the one that it meets.
   [[nodiscard]] static Eigen::Vector2i steps(double rise, const Direction& direction);
+
+  // Where a map is given, what is called a texel below is a place of it: rays move on the map, and
+  // each place that they meet shows a texel of the stack.
+
   /// The texel so many columns and rows from another, around the tile's edges.
-  [[nodiscard]] int moved(int texel, const Eigen::Vector2i& steps) const;
+  [[nodiscard]] int moved(int texel,
+                          const Eigen::Vector2i& steps,
+                          const TexelMap* map = nullptr) const;
   /// Where the ray through a texel of the reference plane meets a layer.
-  [[nodiscard]] int met(int texel, int layer, const Direction& view) const {
-    return moved(texel, steps(heights_[static_cast<std::size_t>(layer)], view));
+  [[nodiscard]] int met(int texel,
+                        int layer,
+                        const Direction& view,
+                        const TexelMap* map = nullptr) const {
+    return moved(texel, steps(heights_[static_cast<std::size_t>(layer)], view), map);
   }
   /// S: the share of a light that reaches a layer's texel through the layers above.
-  [[nodiscard]] double arriving(int layer, int texel, const Direction& light) const;
+  [[nodiscard]] double arriving(int layer,
+                                int texel,
+                                const Direction& light,
+                                const TexelMap* map = nullptr) const;
   /// What a layer's texel sends to the eye, without what lies above it. Light above the horizon.
   [[nodiscard]] Eigen::Vector3d layer_radiance(int layer,
                                                int texel,
                                                const Direction& view,
-                                               const Direction& light) const;
+                                               const Direction& light,
+                                               const TexelMap* map = nullptr) const;
   /// What is drawn; 0 for lights at and below the horizon. A view below it counts as on it.
   [[nodiscard]] Eigen::Vector3d radiance(int texel,
                                          const Direction& view,
-                                         const Direction& light) const;
+                                         const Direction& light,
+                                         const TexelMap* map = nullptr) const;
 
   /// An array of four RGBA textures for each layer: K_d, a; K_s, k; C, L_d; N, 0.
   [[nodiscard]] ModelTexture texture() const;

@@ -10,6 +10,9 @@ namespace {
 
 constexpr std::string_view kName = "layered";
 
+constexpr char kTexelAtGlsl[] =
+#include "btf/models/texel_at.glsl.inc"
+    ;
 constexpr char kLobesGlsl[] =
 #include "btf/models/lobes/lobes.glsl.inc"
     ;
@@ -28,17 +31,23 @@ class Layered final : public Material {
   const DirectionSet& lights() const override { return frame_.lights; }
 
   void reconstruct(int texel, std::span<float> rgb) const override {
-    auto out = rgb.begin();
-    for (const Direction& view : frame_.views)
-      for (const Direction& light : frame_.lights)
-        for (const double value : fit_.stack.radiance(texel, view, light))
-          *out++ = static_cast<float>(value);
+    reconstruct_at(texel, nullptr, rgb);
+  }
+  void reconstruct_on(const TexelMap& map, int place, std::span<float> rgb) const override {
+    reconstruct_at(place, &map, rgb);
   }
 
   Eigen::Vector3d radiance(int texel,
                            const Direction& view,
                            const Direction& light) const override {
     return fit_.stack.radiance(texel, view, light);
+  }
+
+  Eigen::Vector3d radiance_on(const TexelMap& map,
+                              int place,
+                              const Direction& view,
+                              const Direction& light) const override {
+    return fit_.stack.radiance(place, view, light, &map);
   }
 
   ModelShader shader() const override {
@@ -57,11 +66,12 @@ class Layered final : public Material {
         stack.layer_count(),
         heights,
         LayerStack::kLeastCosine);
-    for (const char* part : {kLobesGlsl, kGlsl}) shader.source += part;
+    for (const char* part : {kTexelAtGlsl, kLobesGlsl, kGlsl}) shader.source += part;
     shader.textures.push_back(stack.texture());
     // Four of each layer, and the transmittance of those above it towards the light.
     const int layers = stack.layer_count();
-    shader.fetches = 4 * layers + layers * (layers - 1) / 2;
+    shader.texels_read = layers + layers * (layers - 1) / 2;
+    shader.fetches = 3 * layers + shader.texels_read;
     shader.shells = ShellLayers{{stack.heights().begin(), stack.heights().end()}};
     return shader;
   }
@@ -77,6 +87,14 @@ class Layered final : public Material {
   }
 
  private:
+  void reconstruct_at(int place, const TexelMap* map, std::span<float> rgb) const {
+    auto out = rgb.begin();
+    for (const Direction& view : frame_.views)
+      for (const Direction& light : frame_.lights)
+        for (const double value : fit_.stack.radiance(place, view, light, map))
+          *out++ = static_cast<float>(value);
+  }
+
   MaterialFrame frame_;
   LayerFit fit_;
 };

@@ -1,36 +1,38 @@
 uniform sampler2DArray Layers;
 
 // LayerStack in float; change both or none. Before it stand the constants kTexels, kLayers, kHeights
-// and kLeastCosine. Of layer n: 4n: K_d, transmittance; K_s, k; C, L_d; N.
+// and kLeastCosine, and texel_at.glsl. Of layer n: 4n: K_d, transmittance; K_s, k; C, L_d; N.
 
-// By how many texels along columns and rows a ray moves while it rises by one.
+// By how many places along columns and rows a ray moves while it rises by one.
 vec2 layer_slope(vec3 direction) {
   // Rows grow towards -y.
   return vec2(direction.x, -direction.y) / max(direction.z, kLeastCosine);
 }
 
-// A texel of the tile, which repeats. Half a texel up, since GPUs divide to within rounding only.
-ivec2 layer_texel(vec2 place) {
-  vec2 texel = floor(place);
-  texel -= vec2(kTexels) * floor((texel + 0.5) / vec2(kTexels));
-  return clamp(ivec2(texel), ivec2(0), kTexels - 1);
+// A place of the tile, which repeats. Half a place up, since GPUs divide to within rounding only.
+ivec2 layer_place(vec2 at) {
+  vec2 place = floor(at);
+  place -= vec2(kPlaces) * floor((place + 0.5) / vec2(kPlaces));
+  return clamp(ivec2(place), ivec2(0), kPlaces - 1);
 }
 
-float layer_arriving(int layer, ivec2 texel, vec2 slope) {
+float layer_arriving(int layer, ivec2 place, vec2 slope) {
   float share = 1.0;
   for (int above = layer - 1; above >= 0 && share > 0.0; --above) {
     vec2 shift = (kHeights[above] - kHeights[layer]) * slope;
-    share *= texelFetch(Layers, ivec3(layer_texel(vec2(texel) + 0.5 + shift), 4 * above), 0).a;
+    ivec2 texel = source_texel(layer_place(vec2(place) + 0.5 + shift));
+    share *= texelFetch(Layers, ivec3(texel, 4 * above), 0).a;
   }
   return share;
 }
 
-// `first` is what the layer's first texture holds there; what tells that the rest is dark comes first.
-vec3 layer_radiance(int layer, ivec2 texel, vec4 first, vec3 view, vec3 light) {
+// `texel` is what the tile shows at `place`, `first` what the layer's first texture holds there; what
+// tells that the rest is dark comes first.
+vec3 layer_radiance(int layer, ivec2 place, ivec2 texel, vec4 first, vec3 view, vec3 light) {
   float cosine = dot(texelFetch(Layers, ivec3(texel, 4 * layer + 3), 0).xyz, light);
   if (!(cosine > 0.0)) return vec3(0.0);
   vec4 shape = texelFetch(Layers, ivec3(texel, 4 * layer + 2), 0);
-  float arrived = layer_arriving(layer, texel, layer_slope(light)) + shape.w;
+  float arrived = layer_arriving(layer, place, layer_slope(light)) + shape.w;
   if (!(arrived > 0.0)) return vec3(0.0);
   vec4 specular = texelFetch(Layers, ivec3(texel, 4 * layer + 1), 0);
   float peak = lobe(vec4(shape.xyz, specular.w), view * light);
@@ -40,14 +42,15 @@ vec3 layer_radiance(int layer, ivec2 texel, vec4 first, vec3 view, vec3 light) {
 vec3 btf_radiance(vec2 uv, vec3 view, vec3 light) {
   if (!(light.z > 0.0)) return vec3(0.0);
   view.z = max(view.z, 0.0);
-  vec2 place = fract(uv) * vec2(kTexels);
+  vec2 at = fract(uv) * vec2(kPlaces);
   vec2 slope = layer_slope(view);
   vec3 seen = vec3(0.0);
   float visible = 1.0;
   for (int layer = 0; layer < kLayers && visible > 0.0; ++layer) {
-    ivec2 texel = layer_texel(place + kHeights[layer] * slope);
+    ivec2 place = layer_place(at + kHeights[layer] * slope);
+    ivec2 texel = source_texel(place);
     vec4 first = texelFetch(Layers, ivec3(texel, 4 * layer), 0);
-    seen += visible * layer_radiance(layer, texel, first, view, light);
+    seen += visible * layer_radiance(layer, place, texel, first, view, light);
     visible *= first.a;
   }
   return seen;
@@ -55,10 +58,11 @@ vec3 btf_radiance(vec2 uv, vec3 view, vec3 light) {
 
 // For shells (btf/model_shader.h).
 vec4 btf_shell(int layer, vec2 uv, vec3 view, vec3 light) {
-  ivec2 texel = layer_texel(fract(uv) * vec2(kTexels));
+  ivec2 place = layer_place(fract(uv) * vec2(kPlaces));
+  ivec2 texel = source_texel(place);
   vec4 first = texelFetch(Layers, ivec3(texel, 4 * layer), 0);
   view.z = max(view.z, 0.0);
   vec3 seen =
-      light.z > 0.0 ? layer_radiance(layer, texel, first, view, light) : vec3(0.0);
+      light.z > 0.0 ? layer_radiance(layer, place, texel, first, view, light) : vec3(0.0);
   return vec4(seen, 1.0 - first.a);
 }
