@@ -20,12 +20,12 @@ namespace veneer::render {
 [[nodiscard]] std::string shell_fragment_source(const btf::ModelShader& shader, int light_count);
 [[nodiscard]] std::string shell_under_fragment_source();
 
-/// Draws the layers of a material as shells: the mesh with its vertices moved along their normals by
-/// each layer's height (silhouettes as in Magda and Kriegman 2005, Figure 6). In the order in which
-/// rays meet them, whatever the mesh: the nearest of all shells first, then what is behind that, and
-/// so on until nothing is left (Everitt 2001, "Interactive Order-Independent Transparency"). Shells
-/// are seen from outside only. Not for frames against a deadline. Needs a current context, always
-/// the same.
+/// Draws the layers of a material as shells: the mesh with its vertices moved along their normals
+/// by each layer's height (silhouettes as in Magda and Kriegman 2005, Figure 6). In the order in
+/// which rays meet them, whatever the mesh: the nearest of all shells first, then what is behind
+/// that, and so on until nothing is left (Everitt 2001, "Interactive Order-Independent
+/// Transparency"). Shells are seen from outside only. Not for frames against a deadline. Needs a
+/// current context, always the same.
 class ShellPass {
  public:
   /// @param shader  with shells.   @param texel_m  what a height of 1 is on the object.
