@@ -11,7 +11,9 @@
 #include "base/random.h"
 #include "base/testing/temporary_folder.h"
 #include "btf/fit_region.h"
+#include "btf/mapped_material.h"
 #include "btf/material.h"
+#include "btf/models/layered/layered.h"
 #include "btf/texel_pyramid.h"
 #include "render/compensate_pass.h"
 #include "render/draw_pass.h"
@@ -62,6 +64,18 @@ Result<btf::SampleSet> make_samples(const std::filesystem::path& folder) {
   for (int texel = 0; texel < info.texel_count(); ++texel) fill(writer.texel(texel), info, texel);
   VENEER_TRY(writer.finish());
   return btf::SampleSet::open(folder);
+}
+
+// Of `side` x `side` places, each of which shows any texel of the sample.
+btf::TexelMap random_map(int side, std::uint64_t seed) {
+  Pcg32 random(seed);
+  std::vector<btf::TexelMap::Source> sources;
+  for (int i = 0; i < side * side; ++i)
+    sources.push_back({static_cast<std::uint16_t>(random.next() % kTexels),
+                       static_cast<std::uint16_t>(random.next() % kTexels)});
+  auto map = btf::TexelMap::create(side, side, std::move(sources), kTexels, kTexels);
+  EXPECT_TRUE(map) << map.error().what;
+  return std::move(*map);
 }
 
 struct Fitted {
@@ -135,6 +149,14 @@ std::vector<Fitted> fit_all(const btf::SampleSet& set) {
       EXPECT_TRUE(material) << material.error().what;
       if (material) all.push_back({fmt::format("{} {}", model.name, name), std::move(*material)});
     }
+  for (const btf::Model& model : btf::models()) {
+    auto material = model.fit(set, quick_options(model.terms == 2 ? "3+1" : "3"), progress);
+    EXPECT_TRUE(material) << material.error().what;
+    if (!material) continue;
+    auto mapped = btf::with_texel_map(std::move(*material), random_map(kTexels, 2));
+    EXPECT_TRUE(mapped) << mapped.error().what;
+    if (mapped) all.push_back({fmt::format("{} with a texel map", model.name), std::move(*mapped)});
+  }
   btf::FitOptions options = quick_options("3+1");
   options.mip_levels = kMipLevels;
   auto material = (*btf::find_model("texel-colours"))->fit(set, options, progress);
@@ -378,6 +400,63 @@ TEST(ModelShaders, DrawTheMipLevelThatIsSet) {
     }
     EXPECT_LE(sum / static_cast<double>(all.size()), kMeanDifference);
   }
+}
+
+// A stack of layers between which rays move several texels.
+std::unique_ptr<btf::Material> random_layers() {
+  btf::LayerStack stack(kTexels, kTexels, {3.0F, 1.0F, -2.0F});
+  Pcg32 random(9);
+  const auto share = [&] { return static_cast<float>(random.uniform()); };
+  for (int layer = 0; layer < stack.layer_count(); ++layer)
+    for (int texel = 0; texel < stack.texel_count(); ++texel) {
+      btf::LayerPoint point;
+      point.diffuse = {share(), share(), share()};
+      point.transmittance = share();
+      point.specular = {0.2F * share(), 0.2F * share(), 0.2F * share()};
+      point.exponent = 1.0F + 5.0F * share();
+      stack.set_point(layer, texel, point);
+    }
+  btf::MaterialFrame frame{kTexels, kTexels, btf::bonn_directions(), btf::bonn_directions()};
+  return btf::layered_material(std::move(frame), std::move(stack));
+}
+
+// Of a map larger than the sample, and of layers, whose rays move on the map. A ray that passes
+// within float's rounding of a texel's edge may meet the other texel: 20 of these queries do, as
+// some measured directions pass through edges exactly. Rays that moved wrongly would be most of
+// them.
+TEST(ModelShaders, DrawAMapLargerThanItsSample) {
+  const auto context = EglContext::create();
+  if (!context) GTEST_SKIP() << context.error().what;
+  constexpr int kSide = 13;
+  constexpr std::size_t kMostAtEdges = 40;  // of 4096 queries
+  std::vector<Query> all = queries(kColumns * kRows);
+  Pcg32 random(4);
+  for (Query& query : all) query.texel = static_cast<int>(random.next() % (kSide * kSide));
+  const auto other_texels = [&](std::unique_ptr<btf::Material> sample) {
+    const auto mapped = btf::with_texel_map(std::move(sample), random_map(kSide, 6));
+    EXPECT_TRUE(mapped) << mapped.error().what;
+    const auto drawn = draw((*mapped)->shader(), all, kSide);
+    EXPECT_TRUE(drawn) << drawn.error().what;
+    std::size_t others = 0;
+    double brightest = 0;
+    for (std::size_t i = 0; drawn && i < all.size(); ++i) {
+      const Vector3d wanted = (*mapped)->radiance(all[i].texel, all[i].view, all[i].light);
+      if ((wanted - (*drawn)[i].head<3>().cast<double>()).cwiseAbs().maxCoeff() >
+          kLargestDifference)
+        ++others;
+      brightest = std::max(brightest, wanted.maxCoeff());
+    }
+    EXPECT_GT(brightest, 0.3) << "nothing was drawn";
+    return others;
+  };
+  const TemporaryFolder folder;
+  const auto set = make_samples(folder.path() / "analytic.btfset");
+  ASSERT_TRUE(set) << set.error().what;
+  SilentProgress progress;
+  auto sample = (*btf::find_model("revised-lpca"))->fit(*set, quick_options("3"), progress);
+  ASSERT_TRUE(sample) << sample.error().what;
+  EXPECT_EQ(other_texels(std::move(*sample)), 0U);
+  EXPECT_LE(other_texels(random_layers()), kMostAtEdges);
 }
 
 // What the angular cache draws of a model is what its shader draws, to the interpolation between
