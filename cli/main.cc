@@ -34,6 +34,7 @@ constexpr std::array kCommands{
             &cli::run_demo},
     Command{"doctor", "Say what this machine offers and what is missing", &cli::run_doctor},
     Command{"evaluate", "Measure how well a material reproduces a sample set", &cli::run_evaluate},
+    Command{"expand", "Cover a larger tile with a material of a small sample", &cli::run_expand},
     Command{"fit", "Fit a model to a sample set", &cli::run_fit},
     Command{
         "harness", "Rehearse the daemon with a tracker that fails as planned", &cli::run_harness},

@@ -11,6 +11,7 @@
 #include "base/random.h"
 #include "base/testing/temporary_folder.h"
 #include "btf/fit_region.h"
+#include "btf/mapped_material.h"
 #include "btf/material.h"
 #include "btf/models/layered/layered.h"
 #include "btf/texel_pyramid.h"
@@ -91,6 +92,18 @@ btf::LayerStack random_stack(int layers, Pcg32& random) {
   return stack;
 }
 
+// Of `side` x `side` places, each of which shows any texel of the sample.
+btf::TexelMap random_map(int side, std::uint64_t seed) {
+  Pcg32 random(seed);
+  std::vector<btf::TexelMap::Source> sources;
+  for (int i = 0; i < side * side; ++i)
+    sources.push_back({static_cast<std::uint16_t>(random.next() % kTexels),
+                       static_cast<std::uint16_t>(random.next() % kTexels)});
+  auto map = btf::TexelMap::create(side, side, std::move(sources), kTexels, kTexels);
+  EXPECT_TRUE(map) << map.error().what;
+  return std::move(*map);
+}
+
 struct Fitted {
   std::string name;
   std::unique_ptr<btf::Material> material;
@@ -162,6 +175,14 @@ std::vector<Fitted> fit_all(const btf::SampleSet& set) {
       EXPECT_TRUE(material) << material.error().what;
       if (material) all.push_back({fmt::format("{} {}", model.name, name), std::move(*material)});
     }
+  for (const btf::Model& model : btf::models()) {
+    auto material = model.fit(set, quick_options(model.terms == 2 ? "3+1" : "3"), progress);
+    EXPECT_TRUE(material) << material.error().what;
+    if (!material) continue;
+    auto mapped = btf::with_texel_map(std::move(*material), random_map(kTexels, 2));
+    EXPECT_TRUE(mapped) << mapped.error().what;
+    if (mapped) all.push_back({fmt::format("{} with a texel map", model.name), std::move(*mapped)});
+  }
   btf::FitOptions options = quick_options("3+1");
   options.mip_levels = kMipLevels;
   auto material = (*btf::find_model("texel-colours"))->fit(set, options, progress);
@@ -445,6 +466,44 @@ TEST(ModelShaders, DrawTheMipLevelThatIsSet) {
     }
     EXPECT_LE(sum / static_cast<double>(all.size()), kMeanDifference);
   }
+}
+
+// Of a map larger than the sample, and of layers, whose rays move on the map.
+TEST(ModelShaders, DrawAMapLargerThanItsSample) {
+  const auto context = EglContext::create();
+  if (!context) GTEST_SKIP() << context.error().what;
+  constexpr int kSide = 13;
+  std::vector<Query> all = queries(kColumns * kRows);
+  Pcg32 random(4);
+  for (Query& query : all) query.texel = static_cast<int>(random.next() % (kSide * kSide));
+  const auto other_texels = [&](std::unique_ptr<btf::Material> sample) {
+    const auto mapped = btf::with_texel_map(std::move(sample), random_map(kSide, 6));
+    EXPECT_TRUE(mapped) << mapped.error().what;
+    const btf::ModelShader shader = (*mapped)->shader();
+    const auto drawn = draw(shader, all, kSide);
+    EXPECT_TRUE(drawn) << drawn.error().what;
+    std::size_t others = 0;
+    double brightest = 0;
+    for (std::size_t i = 0; drawn && i < all.size(); ++i) {
+      if (meets_border(shader.shells, all[i])) continue;
+      const Vector3d wanted = (*mapped)->radiance(all[i].texel, all[i].view, all[i].light);
+      if ((wanted - (*drawn)[i].head<3>().cast<double>()).cwiseAbs().maxCoeff() >
+          kLargestDifference)
+        ++others;
+      brightest = std::max(brightest, wanted.maxCoeff());
+    }
+    EXPECT_GT(brightest, 0.3) << "nothing was drawn";
+    return others;
+  };
+  const TemporaryFolder folder;
+  const auto set = make_samples(folder.path() / "analytic.btfset");
+  ASSERT_TRUE(set) << set.error().what;
+  SilentProgress progress;
+  auto sample = (*btf::find_model("revised-lpca"))->fit(*set, quick_options("3"), progress);
+  ASSERT_TRUE(sample) << sample.error().what;
+  EXPECT_EQ(other_texels(std::move(*sample)), 0U);
+  btf::MaterialFrame frame{kTexels, kTexels, btf::bonn_directions(), btf::bonn_directions()};
+  EXPECT_EQ(other_texels(btf::layered_material(std::move(frame), random_stack(3, random))), 0U);
 }
 
 // What the angular cache draws of a model is what its shader draws, to the interpolation between

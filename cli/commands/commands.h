@@ -12,6 +12,7 @@ Result<int> run_compare(CommandLine& line);
 Result<int> run_demo(CommandLine& line);
 Result<int> run_doctor(CommandLine& line);
 Result<int> run_evaluate(CommandLine& line);
+Result<int> run_expand(CommandLine& line);
 Result<int> run_fit(CommandLine& line);
 Result<int> run_harness(CommandLine& line);
 Result<int> run_import(CommandLine& line);
