@@ -11,11 +11,11 @@ using nlohmann::json;
 
 constexpr int kVersion = 1;
 
-/// "bench: a.toml, not b.toml" for the first thing in which they differ.
+/// "bench: "a.toml" then, "b.toml" now" for the first thing in which they differ.
 std::string difference(const json& there, const json& here) {
   for (const auto& [key, value] : here.items()) {
     const json old = there.value(key, json());
-    if (old != value) return fmt::format("its {} is {}, not {}", key, old.dump(), value.dump());
+    if (old != value) return fmt::format("{}: {} then, {} now", key, old.dump(), value.dump());
   }
   return "it knows of something that this one does not";
 }

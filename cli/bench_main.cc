@@ -7,6 +7,8 @@
 int main(int argc, char** argv) {
   using namespace veneer::cli;
   constexpr Command kBench{
-      "bench", "Time what this machine does: render, fit, query, colour", &run_bench};
+      "bench",
+      "Time what this machine does: render, fit, query, colour, latency, governor",
+      &run_bench};
   return run_command(kBench, {argv + (argc > 0 ? 1 : 0), argv + argc});
 }

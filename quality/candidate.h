@@ -71,8 +71,8 @@ struct TradePoint {
 };
 
 /// Mean dE00 by which a dearer way must be nearer to be worth anything: a fiftieth of what is seen
-/// (0.5), and no more than a mean over 4 x 2000 pixels moves when others are compared
-/// (docs/measured.md, "The trade").
+/// (0.5), and what a mean over 4 x 2000 pixels moves by when others are compared
+/// (docs/howto/trade.md).
 constexpr double kLeastGain = 0.01;
 
 /// Which of `points` are worth their cost. With `least_gain` 0 those that no other one beats: of

@@ -431,6 +431,14 @@ TEST(ScreenReferenceOptions, RefuseWhatCannotBeCompared) {
   EXPECT_FALSE(ScreenReferenceOptions{.pixels = 10'000'001}.check());
   EXPECT_FALSE(ScreenReferenceOptions{.rays = 0}.check());
   EXPECT_FALSE(ScreenReferenceOptions{.rays = 33}.check());
+  for (const int seeds : {1, 64})
+    EXPECT_TRUE(ScreenReferenceOptions{.dither_seeds = seeds}.check());
+  for (const int seeds : {-1, 0, 65}) {
+    const Status refused = ScreenReferenceOptions{.dither_seeds = seeds}.check();
+    ASSERT_FALSE(refused) << seeds;
+    EXPECT_NE(refused.error().what.find(fmt::format("{} dither seeds", seeds)), std::string::npos)
+        << refused.error().what;
+  }
 }
 
 }  // namespace

@@ -21,6 +21,7 @@
 #include "btf/material.h"
 #include "btf/sample_set.h"
 #include "calibration/profile.h"
+#include "quality/candidate.h"
 #include "quality/ladder.h"
 #include "tests/program.h"
 
@@ -180,7 +181,7 @@ TEST_F(TradeTest, GoesOnWhereItWasKilledWithTheSameResult) {
   for (const json& c : report["candidates"]) {
     if (c["key"] != report["chosen"]) continue;
     ++found;
-    EXPECT_EQ(c["received_de00_mean"], least);
+    EXPECT_LE(c["received_de00_mean"], least + quality::kLeastGain);
   }
   EXPECT_EQ(found, 1);
 
@@ -193,16 +194,20 @@ TEST_F(TradeTest, GoesOnWhereItWasKilledWithTheSameResult) {
   std::string loud = line(cut, fmt::format("--budget-mb 0 --material {}", material.string()));
   loud.replace(loud.find("--quiet "), 8, "");
   EXPECT_TRUE(fails(run(loud), 3, "the least MB is"));
+  // The nearest miss is said though all else is quiet.
+  const Outcome quiet = run(line(cut, "--budget-mb 0"));
+  EXPECT_TRUE(fails(quiet, 3, "the least MB is"));
+  EXPECT_TRUE(fails(quiet, 3, " over"));
   EXPECT_FALSE(fs::exists(material));
   EXPECT_TRUE(fs::exists(cut / "index.html"));
 
   // Other models are another run, and so is another scene; the refusal names what differs.
   std::string fewer = line(cut);
   fewer.replace(fewer.find("phong,lpca"), 10, "phong");
-  EXPECT_TRUE(fails(run(fewer), 2, "its models"));
+  EXPECT_TRUE(fails(run(fewer), 2, "models: \"phong lpca\" then, \"phong\" now"));
   std::string text = read_text(scene_).value();
   ASSERT_TRUE(write_text(scene_, text + "[object]\nposition = [0, 0.01, 0]\n"));
-  EXPECT_TRUE(fails(run(line(cut)), 2, "its scene is"));
+  EXPECT_TRUE(fails(run(line(cut)), 2, "(scene: "));
 }
 
 TEST_F(TradeTest, RefusesWhatItCannotUse) {
