@@ -138,6 +138,17 @@ Status FitOptions::check() const {
   VENEER_TRY(check_range("clusters", clusters, 1, kMostClusters));
   VENEER_TRY(check_range("angular", angular, kLeastAngular, kMostAngular));
   VENEER_TRY(check_range("lobes", lobes, 1, kMostLobes));
+  VENEER_TRY(check_range("layers", layers, 0, LayerStack::kMostLayers));
+  constexpr double kMostHeight = LayerStack::kMostHeight;
+  if (heights && !(heights->lowest >= -kMostHeight && heights->highest <= kMostHeight &&
+                   (heights->lowest < heights->highest ||
+                    (layers == 1 && heights->lowest == heights->highest))))
+    return fail(Errc::kInvalidOption,
+                "heights are {} to {}; the lowest should be below the highest, both within {} "
+                "texels of the reference plane",
+                heights->lowest,
+                heights->highest,
+                kMostHeight);
   VENEER_TRY(check_range("mip_levels", mip_levels, 1, 15));
   VENEER_TRY(check_range("basis", basis, 0, 4096));
   VENEER_TRY(check_range("iterations", iterations, 1, 10000));
