@@ -49,6 +49,7 @@ set(VENEER_MODEL_TESTS
   models/half_angle_test.cc
   models/lafortune/lafortune_test.cc
   models/layered/layer_fit_test.cc
+  models/layered/layer_stack_test.cc
   models/layered/point_solver_test.cc
   models/lobes/lobe_fit_test.cc
   models/lobes/lobe_models_test.cc

@@ -102,6 +102,7 @@ Result<FitReport> fit(const FitRequest& request, btf::Communicator& ranks, Progr
 Result<int> run_fit(CommandLine& line) {
   FitRequest request;
   btf::FitOptions& options = request.options;
+  std::vector<double> heights;
   std::string names;
   for (const btf::Model& model : btf::models())
     names += fmt::format("\n  {}: {}", model.name, model.summary);
@@ -114,6 +115,17 @@ Result<int> run_fit(CommandLine& line) {
       ->capture_default_str();
   app.add_option("--lobes", options.lobes, "Lobes of a texel, for models made of them")
       ->capture_default_str();
+  app.add_option("--layers",
+                 options.layers,
+                 "Layers of layered; 0: as many as the sample's parallax supports")
+      ->capture_default_str();
+  app.add_option(
+         "--heights",
+         heights,
+         "Where the lowest and the highest of them lie, texels above the reference plane, as "
+         "--heights=-1,3; found from the sample where nobody says")
+      ->delimiter(',')
+      ->expected(2);
   app.add_option("--form",
                  options.form,
                  "How terms are put together; dichromatic-lpca: learned, ratio, subtractive");
@@ -145,6 +157,7 @@ Result<int> run_fit(CommandLine& line) {
       ->expected(2);
   app.add_option("--seed", options.seed, "Seed of everything random")->capture_default_str();
   line.parse();
+  if (!heights.empty()) options.heights = btf::HeightRange{heights[0], heights[1]};
 
   VENEER_ASSIGN(const std::unique_ptr<btf::Communicator> ranks, connect_ranks());
   options.ranks = ranks.get();

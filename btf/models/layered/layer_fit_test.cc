@@ -150,5 +150,87 @@ TEST(LayerFit, FindsALayeredSetAgainFromNoisySamples) {
   }
 }
 
+// What a fit makes of a set given by a formula, at every measured pair.
+double largest_radiance(const SampleSetInfo& info, const testing::SampleFunction& sample) {
+  const TemporaryFolder folder;
+  const SampleSet set = make_set(folder.path() / "edge.btfset", info, sample);
+  SilentProgress progress;
+  FitOptions options;
+  options.layers = 2;
+  const auto pairs = FittedPairs::of(set.info(), nullptr);
+  const auto fit = fit_layers(set, *pairs, options, progress);
+  EXPECT_TRUE(fit.has_value());
+  double largest = 0.0;
+  for (int texel = 0; texel < info.texel_count(); ++texel)
+    for (const Direction& view : info.views)
+      for (const Direction& light : info.lights) {
+        const Eigen::Vector3d value = fit->stack.radiance(texel, view, light);
+        EXPECT_TRUE(value.allFinite());
+        largest = std::max(largest, value.maxCoeff());
+      }
+  return largest;
+}
+
+TEST(LayerFit, HoldsAtTheEdgesOfWhatASetMayBe) {
+  SampleSetInfo info;
+  info.width = 4;
+  info.height = 3;
+  info.views = info.lights = testing::ring(6, 0.9);
+  info.source = "a formula";
+  const auto level = [&info](float of) {
+    return [&info, of](int, int, int light, int) {
+      return of * static_cast<float>(info.lights[static_cast<std::size_t>(light)].z());
+    };
+  };
+  EXPECT_EQ(largest_radiance(info, level(0.0F)), 0.0);
+  EXPECT_NEAR(largest_radiance(info, level(0.5F)), 0.5, 0.01);
+  EXPECT_NEAR(largest_radiance(info, level(500.0F)), 500.0, 10.0);
+
+  SampleSetInfo one_texel = info;
+  one_texel.width = one_texel.height = 1;
+  EXPECT_NEAR(largest_radiance(one_texel, level(0.5F)), 0.5, 0.01);
+  SampleSetInfo one_view = info;
+  one_view.views = {Direction::UnitZ()};
+  EXPECT_NEAR(largest_radiance(one_view, level(0.5F)), 0.5, 0.01);
+  info.lights = {direction_from_angles({1.0, 0.3})};
+  EXPECT_NEAR(largest_radiance(info, level(0.5F)), 0.5 * std::cos(1.0), 0.01);
+  info.lights = testing::ring(8, 1.55);
+  info.lights.erase(info.lights.begin());
+  EXPECT_NEAR(largest_radiance(info, level(0.5F)), 0.5 * std::cos(1.55), 0.01);
+}
+
+// Without parallax nothing tells layers apart.
+TEST(LayerFit, AFlatSetHasOneLayer) {
+  const TemporaryFolder folder;
+  SampleSetInfo info;
+  info.width = info.height = 12;
+  info.views = info.lights = half_sphere();
+  info.source = "a flat sheet";
+  Pcg32 random(3);
+  std::vector<float> colours;
+  for (int i = 0; i < 3 * info.texel_count(); ++i)
+    colours.push_back(static_cast<float>(0.1 + 0.8 * random.uniform()));
+  const SampleSet set =
+      make_set(folder.path() / "flat.btfset", info, [&](int texel, int, int light, int channel) {
+        return colours[static_cast<std::size_t>(3 * texel + channel)] *
+               static_cast<float>(info.lights[static_cast<std::size_t>(light)].z());
+      });
+  SilentProgress progress;
+  const auto pairs = FittedPairs::of(set.info(), nullptr);
+  const auto fit = fit_layers(set, *pairs, {}, progress);
+  ASSERT_TRUE(fit.has_value());
+  ASSERT_EQ(fit->stack.layer_count(), 1);
+  EXPECT_NEAR(fit->stack.heights()[0], 0.0, 0.3);
+}
+
+TEST(LayerFit, IsTheSameOnAnyNumberOfThreads) {
+  EXPECT_EQ(testing::results_on_threads("LayerFit.DISABLED_PrintsItsResult", {1, 2, 3}).size(), 1U);
+}
+
+TEST(LayerFit, DISABLED_PrintsItsResult) {
+  const Recovery got = fitted(1);
+  fmt::print("result {:.17g} {:.17g}\n", got.rmse, got.normal_median);
+}
+
 }  // namespace
 }  // namespace veneer::btf
