@@ -23,8 +23,8 @@ constexpr double kByte = 1.0 / 127.0;
 constexpr double kSmooth = 2e-6;
 // A stack of layers has steps, where a ray goes over to the next texel, as high as these differ.
 // They lie on curves of directions that none of the families' seams is on with these heights, in
-// texels; between them it is a formula.
-constexpr btf::HeightRange kLayersAt{-0.37, 0.71};
+// texels; between them it is a formula. Flat sets lie in the lowest of them.
+constexpr btf::HeightRange kLayersAt{0.0, 0.71};
 // Cells of a table keep one triangle each, so that there is a step where the next cell has another;
 // measured 5.6e-6.
 constexpr double kTable = 5e-5;

@@ -37,16 +37,22 @@ constexpr double kLeastForgetting = 0.95;
 // unknowns gain on noise alone.
 constexpr double kSimplerAt = 1.01;
 
+// By how much more or less where all eight neighbours are so, or are not. Parts of one colour lie
+// at any height as far as they alone can tell; their edges tell, and this carries it inwards. 24 x
+// 24 texels of lichen, two seeds: 0 puts 82 % of them right, this 94 %; errors are alike, and those
+// of views beyond the fitted ones a sixth smaller. From 1 on nothing would be clear beside what is
+// opaque.
+constexpr double kNeighbours = 0.7;
+
+// Colours at most, of the largest sample under a light along the normal: between and beyond the
+// data nothing holds a lobe otherwise.
+constexpr float kMostRise = 2.0F;
+constexpr float kLeastShare = 0.05F;
+
 // Sums over a point's samples of what it sends (L) and what comes from below (B), both as they are
 // seen, against what is wanted (R).
 struct Blend {
-  double ll = 0.0, lb = 0.0, bb = 0.0, lr = 0.0, br = 0.0, rr = 0.0;
-
-  [[nodiscard]] double error(double of_layer, double of_below) const {
-    const double error = rr + of_layer * of_layer * ll + of_below * of_below * bb +
-                         2.0 * (of_layer * of_below * lb - of_layer * lr - of_below * br);
-    return std::max(error, 0.0);
-  }
+  double ll = 0.0, lb = 0.0, bb = 0.0, lr = 0.0, br = 0.0;
 };
 
 // One point with all that is said of it.
@@ -59,18 +65,21 @@ class PointFit {
     LayerPoint point;
     double error = 0.0;
     bool fell_back = false;
+    bool simpler = false;  // taken though another has less error
   };
 
   // @param forgetting  where it begins; it rises to 1 over the passes.
-  [[nodiscard]] Outcome fit(int layer, int texel, double forgetting, bool again) {
+  // @param opaque_around  the share of the neighbours that are opaque.
+  [[nodiscard]] Outcome fit(
+      int layer, int texel, double forgetting, double opaque_around, bool again) {
     stack_.look(layer, texel, order_, views_);
     const LayerPoint before = stack_.points(layer)[static_cast<std::size_t>(texel)];
     shade_ = stack_.arriving(layer, texel);
     with_radiance_ = layer > 0 && shade_.minCoeff() < 1.0F;
 
-    const Blend as_before = blend_of(before);
-    const double error_before = as_before.error(1.0, before.transmittance);
-    if (!(as_before.rr > 0.0) && !(as_before.bb > 0.0)) return {before, error_before, false};
+    const double error_before = error_of(before);
+    take_measure();
+    if (!(energy_ > 0.0)) return {before, error_before};
 
     const bool lowest = layer == stack_.layer_count() - 1;
     const bool known = before.diffuse.maxCoeff() > 0.0F && before.transmittance < 0.9F;
@@ -79,9 +88,9 @@ class PointFit {
     point.transmittance = 0.0F;
     Outcome best = solved(point, forgetting);
     if (!known) best = solved(best.point, 1.0);
-    if (!lowest) best = blended(best);
+    if (!lowest) best = blended(best, opaque_around);
     if (again) best = with_fresh_lobe(best);
-    if (!(best.error < error_before * (1.0 + 1e-6))) {
+    if (!best.simpler && !(best.error < error_before * (1.0 + 1e-6))) {
       // Where the neighbours have moved, what was there before may fit better than a new answer.
       best = {before, error_before, best.fell_back};
     }
@@ -91,7 +100,7 @@ class PointFit {
  private:
   // The point that the views lead to from another; its transmittance stays.
   [[nodiscard]] Outcome solved(const LayerPoint& from, double forgetting) {
-    Outcome best{from, blend_of(from).error(1.0, from.transmittance), false};
+    Outcome best{from, error_of(from)};
     best.fell_back = !pass(best, forgetting, kSteps);
     for (int i = 0; i < kWholePasses; ++i) {
       const double before = best.error;
@@ -102,7 +111,7 @@ class PointFit {
   }
   // False where no step held.
   bool pass(Outcome& best, double forgetting, int steps) {
-    PointSolver solver(best.point, with_radiance_);
+    PointSolver solver(best.point, with_radiance_, most_colour_);
     const std::size_t chunk =
         std::max<std::size_t>(1, order_.size() / static_cast<std::size_t>(steps));
     std::size_t taken = 0;
@@ -115,7 +124,7 @@ class PointFit {
       moved = solver.step(forgetting + (1.0 - forgetting) * done) || moved;
     }
     if (!moved) return false;
-    const double error = blend_of(solver.point()).error(1.0, solver.point().transmittance);
+    const double error = error_of(solver.point());
     if (error < best.error) {
       best.point = solver.point();
       best.error = error;
@@ -124,9 +133,12 @@ class PointFit {
   }
 
   // Eq. (13): how much of the candidate and how much of what lies below; then the layer again.
-  [[nodiscard]] Outcome blended(const Outcome& opaque) {
+  [[nodiscard]] Outcome blended(const Outcome& opaque, double opaque_around) {
+    const double lean = kNeighbours * (2.0 * opaque_around - 1.0);
     const Blend blend = blend_of(opaque.point);
-    const double clear_error = blend.error(0.0, 1.0);
+    const double clear_error = error_of({});
+    // Below this all is rounding, and the simpler one of two is taken.
+    const double rounding = 1e-9 * energy_;
     double of_layer = 1.0;
     double of_below = 0.0;
     const double determinant = blend.ll * blend.bb - blend.lb * blend.lb;
@@ -143,9 +155,11 @@ class PointFit {
       mixed.diffuse *= static_cast<float>(of_layer);
       mixed.specular *= static_cast<float>(of_layer);
       const Outcome through = solved(mixed, 1.0);
-      if (opaque.error > kSimplerAt * through.error) best = through;
+      best.simpler = opaque.error <= (kSimplerAt + lean) * through.error + rounding;
+      if (!best.simpler) best = through;
     }
-    if (clear_error <= kSimplerAt * best.error) best = {LayerPoint{}, clear_error, false};
+    if (clear_error <= (kSimplerAt - lean) * best.error + rounding)
+      best = {LayerPoint{}, clear_error, false, true};
     return best;
   }
 
@@ -156,7 +170,8 @@ class PointFit {
     point.specular = fresh.specular;
     point.exponent = fresh.exponent;
     point.lobe = fresh.lobe;
-    const Outcome found = solved(point, kLeastForgetting);
+    Outcome found = solved(point, kLeastForgetting);
+    found.simpler = known.simpler;
     return found.error < known.error ? found : known;
   }
 
@@ -169,6 +184,34 @@ class PointFit {
     for (int c = 0; c < 3; ++c)
       sent.col(c) = shine * (point.diffuse[c] + point.specular[c] * lobe_);
     return sent;
+  }
+
+  // What is wanted in all, and how bright a point may be to send it.
+  void take_measure() {
+    energy_ = 0.0;
+    float largest = 0.0F;
+    for (const int v : order_) {
+      const PointView& view = views_[static_cast<std::size_t>(v)];
+      if (!(view.visible > 0.0F)) continue;
+      energy_ += double(view.wanted.square().sum());
+      largest = std::max(largest, view.wanted.maxCoeff() / std::max(view.visible, kLeastShare));
+    }
+    most_colour_ = kMostRise * largest / std::max(stack_.lights().col(2).maxCoeff(), kLeastShare);
+  }
+
+  // Of the whole along its views, as residuals, since sums of squares of what is nearly equal
+  // cancel.
+  [[nodiscard]] double error_of(const LayerPoint& point) {
+    double error = 0.0;
+    for (const int v : order_) {
+      const PointView& view = views_[static_cast<std::size_t>(v)];
+      if (!(view.visible > 0.0F)) continue;
+      LightRows rest =
+          (sent_by(point, view) + point.transmittance * view.below) * view.visible - view.wanted;
+      if (view.weight.size() > 0) rest.colwise() *= view.weight.sqrt();
+      error += double(rest.square().sum());
+    }
+    return error;
   }
 
   [[nodiscard]] Blend blend_of(const LayerPoint& point) {
@@ -188,7 +231,6 @@ class PointFit {
       blend.bb += double(below.square().sum());
       blend.lr += double((sent * wanted).sum());
       blend.br += double((below * wanted).sum());
-      blend.rr += double(wanted.square().sum());
     }
     return blend;
   }
@@ -198,6 +240,8 @@ class PointFit {
   std::vector<PointView> views_;
   Eigen::ArrayXf shade_;
   bool with_radiance_ = false;
+  double energy_ = 0.0;
+  float most_colour_ = 0.0F;
   Eigen::ArrayXf lobe_;
 };
 
@@ -271,7 +315,8 @@ Result<LayerFit> fit_layers(const SampleSet& set,
       parallel_for(frame.texel_count(), kGrain, [&](std::int64_t begin, std::int64_t end) {
         PointFit fit(stack, std::span(order).first(looked_at));
         for (auto texel = static_cast<int>(begin); texel < end; ++texel) {
-          const PointFit::Outcome outcome = fit.fit(layer, texel, forgetting, looks_again(sweep));
+          const PointFit::Outcome outcome = fit.fit(
+              layer, texel, forgetting, stack.opaque_around(layer, texel), looks_again(sweep));
           points[static_cast<std::size_t>(texel)] = outcome.point;
           fell_back += outcome.fell_back ? 1 : 0;
         }

@@ -86,6 +86,15 @@ double LayerViews::squared_error(int stride) const {
   return std::accumulate(errors.begin(), errors.end(), 0.0);
 }
 
+double LayerViews::opaque_around(int layer, int texel) const {
+  double opaque = 0.0;
+  for (int y = -1; y <= 1; ++y)
+    for (int x = -1; x <= 1; ++x)
+      if (x != 0 || y != 0)
+        opaque += 1.0 - double(point(layer, moved(texel, {x, y})).transmittance);
+  return opaque / 8.0;
+}
+
 Eigen::ArrayXf LayerViews::arriving(int layer, int texel) const {
   Eigen::ArrayXf share = Eigen::ArrayXf::Ones(lights_.rows());
   if (!shadows_) return share;

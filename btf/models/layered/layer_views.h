@@ -39,6 +39,8 @@ class LayerViews {
   /// Of what the stack as a whole sends, over every `stride`-th texel.
   [[nodiscard]] double squared_error(int stride) const;
 
+  /// Of a point's eight neighbours in its layer the share that is opaque, 0 to 1.
+  [[nodiscard]] double opaque_around(int layer, int texel) const;
   /// S of each light at a point.
   [[nodiscard]] Eigen::ArrayXf arriving(int layer, int texel) const;
   /// What some views say of a point. @param order  which. @param views  view_count(); those of

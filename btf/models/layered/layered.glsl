@@ -16,12 +16,15 @@ ivec2 layer_place(vec2 at) {
   return clamp(ivec2(place), ivec2(0), kPlaces - 1);
 }
 
+// Loops have constant bounds, and conditions inside, so that compilers unroll them.
 float layer_arriving(int layer, ivec2 place, vec2 slope) {
   float share = 1.0;
-  for (int above = layer - 1; above >= 0 && share > 0.0; --above) {
-    vec2 shift = (kHeights[above] - kHeights[layer]) * slope;
-    ivec2 texel = source_texel(layer_place(vec2(place) + 0.5 + shift));
-    share *= texelFetch(Layers, ivec3(texel, 4 * above), 0).a;
+  for (int above = 0; above < kLayers; ++above) {
+    if (above < layer && share > 0.0) {
+      vec2 shift = (kHeights[above] - kHeights[layer]) * slope;
+      ivec2 texel = source_texel(layer_place(vec2(place) + 0.5 + shift));
+      share *= texelFetch(Layers, ivec3(texel, 4 * above), 0).a;
+    }
   }
   return share;
 }
@@ -46,12 +49,14 @@ vec3 btf_radiance(vec2 uv, vec3 view, vec3 light) {
   vec2 slope = layer_slope(view);
   vec3 seen = vec3(0.0);
   float visible = 1.0;
-  for (int layer = 0; layer < kLayers && visible > 0.0; ++layer) {
-    ivec2 place = layer_place(at + kHeights[layer] * slope);
-    ivec2 texel = source_texel(place);
-    vec4 first = texelFetch(Layers, ivec3(texel, 4 * layer), 0);
-    seen += visible * layer_radiance(layer, place, texel, first, view, light);
-    visible *= first.a;
+  for (int layer = 0; layer < kLayers; ++layer) {
+    if (visible > 0.0) {
+      ivec2 place = layer_place(at + kHeights[layer] * slope);
+      ivec2 texel = source_texel(place);
+      vec4 first = texelFetch(Layers, ivec3(texel, 4 * layer), 0);
+      seen += visible * layer_radiance(layer, place, texel, first, view, light);
+      visible *= first.a;
+    }
   }
   return seen;
 }

@@ -23,8 +23,8 @@ constexpr int kRadiance = 13;
 constexpr float kLeastBase = 1e-6F;
 // Of the information's mean diagonal: holds what the data do not say.
 constexpr double kDamping = 1e-4;
-constexpr float kMostColour = 1e3F;
-constexpr float kMostRadiance = 8.0F;
+// Light from all around is no brighter than what comes straight.
+constexpr float kMostRadiance = 1.0F;
 
 }  // namespace
 
@@ -33,8 +33,8 @@ void lobe_rows(const LayerPoint& point, const Eigen::ArrayX3f& u, Eigen::ArrayXf
   out = (out > kLeastBase).select((out.max(kLeastBase).log() * point.exponent).exp(), 0.0F);
 }
 
-PointSolver::PointSolver(const LayerPoint& start, bool with_radiance)
-    : point_(start), with_radiance_(with_radiance) {}
+PointSolver::PointSolver(const LayerPoint& start, bool with_radiance, float most_colour)
+    : point_(start), with_radiance_(with_radiance), most_colour_(most_colour) {}
 
 void PointSolver::add(const PointView& view,
                       const Eigen::ArrayXf& shade,
@@ -113,8 +113,8 @@ bool PointSolver::step(double forgetting) {
   next.normal /= length;
   next.lobe /= largest;
   const float peak = std::pow(largest, next.exponent) * length;
-  next.diffuse = (next.diffuse * length).cwiseMax(0.0F).cwiseMin(kMostColour);
-  next.specular = (next.specular * peak).cwiseMax(0.0F).cwiseMin(kMostColour);
+  next.diffuse = (next.diffuse * length).cwiseMax(0.0F).cwiseMin(most_colour_);
+  next.specular = (next.specular * peak).cwiseMax(0.0F).cwiseMin(most_colour_);
   // From below, no light of the sample's could be told from none.
   if (next.normal.z() < 0.0F) {
     next.normal.z() = 0.0F;

@@ -33,7 +33,8 @@ class PointSolver {
   static constexpr int kUnknowns = 14;  // K_d, K_s, C, log k, N, L_d
 
   /// @param with_radiance  whether L_d is free; without shadow it cannot be told from the colours.
-  PointSolver(const LayerPoint& start, bool with_radiance);
+  /// @param most_colour  that a diffuse or specular colour may have
+  PointSolver(const LayerPoint& start, bool with_radiance, float most_colour);
   /// Takes in what one view says.
   /// @param shade  S of each light  @param lights  [light][3]
   void add(const PointView& view, const Eigen::ArrayXf& shade, const Eigen::ArrayX3f& lights);
@@ -47,6 +48,7 @@ class PointSolver {
   using Matrix = Eigen::Matrix<double, kUnknowns, kUnknowns>;
   LayerPoint point_;
   bool with_radiance_;
+  float most_colour_;
   Matrix information_ = Matrix::Zero();
   Vector gradient_ = Vector::Zero();
   Eigen::Matrix<float, Eigen::Dynamic, kUnknowns> jacobian_;

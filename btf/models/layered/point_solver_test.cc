@@ -71,7 +71,7 @@ TEST(PointSolver, FindsColoursLobeNormalAndRadianceAgain) {
   point.transmittance = 0.0F;
   const double before = error_of(point, scene);
   for (int pass = 0; pass < 6; ++pass) {
-    PointSolver solver(point, true);
+    PointSolver solver(point, true, 2.0F);
     for (const PointView& view : scene.views) solver.add(view, scene.shade, scene.lights);
     ASSERT_TRUE(solver.step(1.0));
     point = solver.point();
@@ -85,7 +85,7 @@ TEST(PointSolver, FindsColoursLobeNormalAndRadianceAgain) {
 
 TEST(PointSolver, StaysWhereNothingIsSaid) {
   const LayerPoint start;
-  PointSolver solver(start, true);
+  PointSolver solver(start, true, 1.0F);
   EXPECT_FALSE(solver.step(1.0));
   EXPECT_EQ(solver.point().diffuse, start.diffuse);
 }
@@ -96,7 +96,8 @@ TEST(PointSolver, GivesFiniteNumbersForBlackAndForHugeSamples) {
     truth.diffuse.setConstant(level);
     truth.transmittance = 0.0F;
     const Scene scene = scene_of(truth, 5);
-    PointSolver solver(start_of(scene.views, scene.order, scene.shade, scene.lights), true);
+    PointSolver solver(
+        start_of(scene.views, scene.order, scene.shade, scene.lights), true, 4.0F * level);
     for (int pass = 0; pass < 4; ++pass) {
       for (const PointView& view : scene.views) solver.add(view, scene.shade, scene.lights);
       solver.step(0.95);
