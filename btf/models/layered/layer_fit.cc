@@ -43,6 +43,11 @@ constexpr double kSimplerAt = 1.01;
 // of views beyond the fitted ones a sixth smaller. From 1 on nothing would be clear beside what is
 // opaque.
 constexpr double kNeighbours = 0.7;
+// How much of that at a depth: below what can be resolved there is nothing to carry on, and layers
+// are but a richer formula for what is flat.
+double share_of(double depth) {
+  return std::clamp((depth - kHeightResolution) / kHeightResolution, 0.0, 1.0);
+}
 
 // Colours at most, of the largest sample under a light along the normal: between and beyond the
 // data nothing holds a lobe otherwise.
@@ -58,8 +63,9 @@ struct Blend {
 // One point with all that is said of it.
 class PointFit {
  public:
-  PointFit(const LayerViews& stack, std::span<const int> order)
-      : stack_(stack), order_(order), views_(stack.view_count()) {}
+  // @param neighbours  how much they count.
+  PointFit(const LayerViews& stack, std::span<const int> order, double neighbours)
+      : stack_(stack), order_(order), neighbours_(neighbours), views_(stack.view_count()) {}
 
   struct Outcome {
     LayerPoint point;
@@ -134,7 +140,7 @@ class PointFit {
 
   // Eq. (13): how much of the candidate and how much of what lies below; then the layer again.
   [[nodiscard]] Outcome blended(const Outcome& opaque, double opaque_around) {
-    const double lean = kNeighbours * (2.0 * opaque_around - 1.0);
+    const double lean = neighbours_ * (2.0 * opaque_around - 1.0);
     const Blend blend = blend_of(opaque.point);
     const double clear_error = error_of({});
     // Below this all is rounding, and the simpler one of two is taken.
@@ -237,6 +243,7 @@ class PointFit {
 
   const LayerViews& stack_;
   std::span<const int> order_;
+  double neighbours_;
   std::vector<PointView> views_;
   Eigen::ArrayXf shade_;
   bool with_radiance_ = false;
@@ -286,13 +293,14 @@ void refine_heights(LayerViews& stack) {
 
 }  // namespace
 
-Result<LayerFit> fit_layers(const SampleSet& set,
-                            const FittedPairs& pairs,
-                            const FitOptions& options,
-                            Progress& progress) {
+LayerFit fit_layers(const SampleSet& set,
+                    const FittedPairs& pairs,
+                    const FitOptions& options,
+                    Progress& progress) {
   const MaterialFrame& frame = pairs.frame();
-  VENEER_ASSIGN(const std::vector<float> heights, layer_heights(set, pairs, options, progress));
-  LayerViews stack(set, pairs, heights);
+  const LayerHeights heights = layer_heights(set, pairs, options, progress);
+  LayerViews stack(set, pairs, heights.heights);
+  const double neighbours = kNeighbours * share_of(heights.depth);
   const int layers = stack.layer_count();
   std::vector<int> order = mixed_order(static_cast<int>(frame.views.size()), options.seed);
   const int sweeps = layers == 1 ? 2 : kSweeps;
@@ -313,7 +321,7 @@ Result<LayerFit> fit_layers(const SampleSet& set,
     for (int layer = layers - 1; layer >= 0; --layer) {
       std::vector<LayerPoint> points = stack.points(layer);
       parallel_for(frame.texel_count(), kGrain, [&](std::int64_t begin, std::int64_t end) {
-        PointFit fit(stack, std::span(order).first(looked_at));
+        PointFit fit(stack, std::span(order).first(looked_at), neighbours);
         for (auto texel = static_cast<int>(begin); texel < end; ++texel) {
           const PointFit::Outcome outcome = fit.fit(
               layer, texel, forgetting, stack.opaque_around(layer, texel), looks_again(sweep));

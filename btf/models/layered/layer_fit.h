@@ -17,10 +17,10 @@ struct LayerFit {
 
 /// Finds a stack of layers in a sample set, after Magda and Kriegman 2005, section 4.
 /// @param set  finite; within float16's range, as fit_scaled() leaves it.
-/// Errors: kInvalidOption (heights out of range, more layers than there may be).
-[[nodiscard]] Result<LayerFit> fit_layers(const SampleSet& set,
-                                          const FittedPairs& pairs,
-                                          const FitOptions& options,
-                                          Progress& progress);
+/// @param options  checked
+[[nodiscard]] LayerFit fit_layers(const SampleSet& set,
+                                  const FittedPairs& pairs,
+                                  const FitOptions& options,
+                                  Progress& progress);
 
 }  // namespace veneer::btf

@@ -132,10 +132,9 @@ Recovery fitted(std::uint64_t seed) {
   const SampleSet set = seen(folder.path() / "bars.btfset", truth, kNoise, seed);
   SilentProgress progress;
   const auto pairs = FittedPairs::of(set.info(), nullptr);
-  const auto fit = fit_layers(set, *pairs, {}, progress);
-  EXPECT_TRUE(fit.has_value());
-  EXPECT_EQ(fit->stack.layer_count(), truth.layer_count());
-  return recovery(set, truth, fit->stack);
+  const LayerFit fit = fit_layers(set, *pairs, {}, progress);
+  EXPECT_EQ(fit.stack.layer_count(), truth.layer_count());
+  return recovery(set, truth, fit.stack);
 }
 
 // Nobody says how many layers there are, nor where.
@@ -158,13 +157,12 @@ double largest_radiance(const SampleSetInfo& info, const testing::SampleFunction
   FitOptions options;
   options.layers = 2;
   const auto pairs = FittedPairs::of(set.info(), nullptr);
-  const auto fit = fit_layers(set, *pairs, options, progress);
-  EXPECT_TRUE(fit.has_value());
+  const LayerFit fit = fit_layers(set, *pairs, options, progress);
   double largest = 0.0;
   for (int texel = 0; texel < info.texel_count(); ++texel)
     for (const Direction& view : info.views)
       for (const Direction& light : info.lights) {
-        const Eigen::Vector3d value = fit->stack.radiance(texel, view, light);
+        const Eigen::Vector3d value = fit.stack.radiance(texel, view, light);
         EXPECT_TRUE(value.allFinite());
         largest = std::max(largest, value.maxCoeff());
       }
@@ -217,10 +215,9 @@ TEST(LayerFit, AFlatSetHasOneLayer) {
       });
   SilentProgress progress;
   const auto pairs = FittedPairs::of(set.info(), nullptr);
-  const auto fit = fit_layers(set, *pairs, {}, progress);
-  ASSERT_TRUE(fit.has_value());
-  ASSERT_EQ(fit->stack.layer_count(), 1);
-  EXPECT_NEAR(fit->stack.heights()[0], 0.0, 0.3);
+  const LayerFit fit = fit_layers(set, *pairs, {}, progress);
+  ASSERT_EQ(fit.stack.layer_count(), 1);
+  EXPECT_NEAR(fit.stack.heights()[0], 0.0, 0.3);
 }
 
 TEST(LayerFit, IsTheSameOnAnyNumberOfThreads) {

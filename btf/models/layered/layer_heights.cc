@@ -17,7 +17,6 @@ namespace {
 constexpr int kMostFound = 4;        // layers where nobody says how many
 constexpr double kSweepStep = 0.25;  // texels
 constexpr double kMostSwept = 12.0;  // texels
-constexpr double kResolution = 0.5;  // texels: layers nearer than this look alike
 // Of the variance at the median height: a texel whose least is not below says nothing of its
 // height.
 constexpr double kTelling = 0.5;
@@ -145,37 +144,41 @@ std::vector<float> spread_evenly(const HeightRange& range, int count) {
 
 }  // namespace
 
-Result<std::vector<float>> layer_heights(const SampleSet& set,
-                                         const FittedPairs& pairs,
-                                         const FitOptions& options,
-                                         Progress& progress) {
-  if (options.heights && options.layers > 0) return spread_evenly(*options.heights, options.layers);
+LayerHeights layer_heights(const SampleSet& set,
+                           const FittedPairs& pairs,
+                           const FitOptions& options,
+                           Progress& progress) {
   const MaterialFrame& frame = pairs.frame();
   const double most = std::min(kMostSwept, 0.25 * std::min(frame.width, frame.height));
   const HeightRange range = options.heights.value_or(HeightRange{-most, most});
   std::vector<Found> found =
       sweep(pictures(set, pairs), frame, range.lowest, range.highest, progress);
-  const double asked = static_cast<double>(found.size());
+  const auto all = static_cast<double>(found.size());
   std::erase_if(found, [](const Found& f) { return f.weight == 0.0; });
-  if (static_cast<double>(found.size()) < kLeastTelling * asked) {
-    // No parallax that could be seen: whatever was asked lies close together.
+  const bool tells = static_cast<double>(found.size()) >= kLeastTelling * all;
+  double depth = 0.0;
+  if (tells) centres(found, 1, depth);
+  if (options.heights && options.layers > 0)
+    return {spread_evenly(*options.heights, options.layers), depth};
+  if (!tells) {
+    // Whatever was asked lies close together.
     const int count = std::max(options.layers, 1);
-    return spread_evenly({-0.5 * kResolution * (count - 1), 0.5 * kResolution * (count - 1)},
-                         count);
+    const double half = 0.5 * kHeightResolution * (count - 1);
+    return {spread_evenly({-half, half}, count), depth};
   }
   std::vector<double> best;
   for (int count = std::max(options.layers, 1); count <= std::max(options.layers, kMostFound);
        ++count) {
     double spread = 0.0;
     best = centres(found, count, spread);
-    if (spread < kResolution) break;
+    if (spread < kHeightResolution) break;
   }
   std::vector<float> heights(best.begin(), best.end());
   std::ranges::sort(heights, std::greater{});
   // Layers that no texel took lie at one place with others.
   for (std::size_t i = 1; i < heights.size(); ++i)
     heights[i] = std::min(heights[i], heights[i - 1] - static_cast<float>(kSweepStep));
-  return heights;
+  return {heights, depth};
 }
 
 }  // namespace veneer::btf

@@ -111,8 +111,7 @@ Result<std::unique_ptr<Material>> fit_layered(const SampleSet& set,
   VENEER_ASSIGN(const FittedPairs pairs, FittedPairs::of(set.info(), options.region));
   VENEER_TRY(check_array("the layers", pairs.frame(), 1, Errc::kInvalidOption, "fit"));
   VENEER_TRY(set.check_finite());
-  VENEER_ASSIGN(LayerFit fit, fit_layers(set, pairs, options, progress));
-  return std::make_unique<Layered>(pairs.frame(), std::move(fit));
+  return std::make_unique<Layered>(pairs.frame(), fit_layers(set, pairs, options, progress));
 }
 
 Result<std::unique_ptr<Material>> load_layered(const SafetensorsFile& file) {
