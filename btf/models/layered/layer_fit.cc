@@ -43,15 +43,15 @@ constexpr double kSimplerAt = 1.01;
 // of views beyond the fitted ones a sixth smaller. From 1 on nothing would be clear beside what is
 // opaque.
 constexpr double kNeighbours = 0.7;
-// How much of that at a depth: below what can be resolved there is nothing to carry on, and layers
-// are but a richer formula for what is flat.
+// How much of that at a depth: a sample that is flat as far as can be told has nothing to carry on,
+// and layers are but a richer formula for it.
 double share_of(double depth) {
-  return std::clamp((depth - kHeightResolution) / kHeightResolution, 0.0, 1.0);
+  return std::clamp(2.0 * depth / kHeightResolution - 1.0, 0.0, 1.0);
 }
 
-// Colours at most, of the largest sample under a light along the normal: between and beyond the
-// data nothing holds a lobe otherwise.
-constexpr float kMostRise = 2.0F;
+// Both colours at most, of the largest sample under a light along the normal: between and beyond
+// the data nothing holds a lobe otherwise.
+constexpr float kMostRise = 4.0F;
 constexpr float kLeastShare = 0.05F;
 
 // Sums over a point's samples of what it sends (L) and what comes from below (B), both as they are

@@ -114,7 +114,9 @@ bool PointSolver::step(double forgetting) {
   next.lobe /= largest;
   const float peak = std::pow(largest, next.exponent) * length;
   next.diffuse = (next.diffuse * length).cwiseMax(0.0F).cwiseMin(most_colour_);
-  next.specular = (next.specular * peak).cwiseMax(0.0F).cwiseMin(most_colour_);
+  next.specular = (next.specular * peak)
+                      .cwiseMax(0.0F)
+                      .cwiseMin((most_colour_ - next.diffuse.array()).matrix());
   // From below, no light of the sample's could be told from none.
   if (next.normal.z() < 0.0F) {
     next.normal.z() = 0.0F;

@@ -33,7 +33,7 @@ class PointSolver {
   static constexpr int kUnknowns = 14;  // K_d, K_s, C, log k, N, L_d
 
   /// @param with_radiance  whether L_d is free; without shadow it cannot be told from the colours.
-  /// @param most_colour  that a diffuse or specular colour may have
+  /// @param most_colour  that diffuse and specular colour may have together
   PointSolver(const LayerPoint& start, bool with_radiance, float most_colour);
   /// Takes in what one view says.
   /// @param shade  S of each light  @param lights  [light][3]
