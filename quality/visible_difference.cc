@@ -140,10 +140,10 @@ Result<double> weighted_rmse(const btf::SampleSet& set,
                              const btf::Material& material,
                              const btf::PairWeights& weights) {
   const btf::SampleSetInfo& info = set.info();
-  VENEER_TRY(btf::refuse_texel_map(
-      material,
-      Errc::kBadFormat,
-      fmt::format("comparing a material with {}", set.path().string())));
+  VENEER_TRY(
+      btf::refuse_texel_map(material,
+                            Errc::kBadFormat,
+                            fmt::format("comparing a material with {}", set.path().string())));
   const std::vector<int> views = places_in(info.views, material.views());
   const std::vector<int> lights = places_in(info.lights, material.lights());
   if (material.width() != info.width || material.height() != info.height || views.empty() ||

@@ -24,8 +24,9 @@ TEST(Materials, AreFoundByNameAndOthersAreNot) {
   const auto none = find_height_field_material("granite");
   ASSERT_FALSE(none.has_value());
   EXPECT_EQ(none.error().code, Errc::kInvalidOption);
-  EXPECT_THAT(none.error().what,
-              testing::HasSubstr("cloth, corrugated, corrugated-print, hammered, leather, plaster"));
+  EXPECT_THAT(
+      none.error().what,
+      testing::HasSubstr("cloth, corrugated, corrugated-print, hammered, leather, plaster"));
 }
 
 TEST(BodyMaterials, AreFoundByNameAndHaveNamesOfTheirOwn) {
