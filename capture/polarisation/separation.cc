@@ -148,7 +148,11 @@ Parts separate(const Array3d& parallel,
                const Array3d& parallel_variance,
                const Array3d& cross_variance,
                const Contrasts& contrasts) {
-  const Array3d q = contrasts.of_polarisers();
+  const Array3d contrast = contrasts.of_polarisers();
+  // Nothing is divided by what is too little.
+  const Array3d q =
+      (contrast.abs() >= kLeastContrast)
+          .select(contrast, Array3d::Constant(std::numeric_limits<double>::quiet_NaN()));
   const Array3d of_parallel = 1 / (1 + contrasts.diffuse);
   const Array3d of_cross = 1 / (1 - contrasts.diffuse);
   const Array3d p = parallel * of_parallel;
@@ -160,11 +164,9 @@ Parts separate(const Array3d& parallel,
   parts.diffuse = p * (1 - 1 / q) + c * (1 + 1 / q);
   parts.specular_variance = (p_variance + c_variance) / q.square();
   parts.diffuse_variance = p_variance * (1 - 1 / q).square() + c_variance * (1 + 1 / q).square();
-  for (int channel = 0; channel < 3; ++channel) {
-    if (std::abs(q[channel]) >= kLeastContrast) continue;
-    parts.specular[channel] = parts.diffuse[channel] = std::numeric_limits<double>::quiet_NaN();
-    parts.specular_variance[channel] = parts.diffuse_variance[channel] = kInfinity;
-  }
+  for (int channel = 0; channel < 3; ++channel)
+    if (std::isnan(q[channel]))
+      parts.specular_variance[channel] = parts.diffuse_variance[channel] = kInfinity;
   return parts;
 }
 
