@@ -316,8 +316,9 @@ LayerFit fit_layers(const SampleSet& set,
         sweep + 2 < sweeps
             ? std::min(order.size(), std::max<std::size_t>(kLeastViews, order.size() / 2))
             : order.size();
-    std::ranges::rotate(order,
-                        order.begin() + static_cast<std::ptrdiff_t>(looked_at % order.size()));
+    std::rotate(order.begin(),
+                order.begin() + static_cast<std::ptrdiff_t>(looked_at % order.size()),
+                order.end());
     for (int layer = layers - 1; layer >= 0; --layer) {
       std::vector<LayerPoint> points = stack.points(layer);
       parallel_for(frame.texel_count(), kGrain, [&](std::int64_t begin, std::int64_t end) {
