@@ -75,8 +75,8 @@ std::vector<Found> sweep(const std::vector<Eigen::ArrayX3f>& pictures,
           squares.row(texel) += value.square();
         }
       }
-      const auto views = static_cast<float>(pictures.size());
-      variance.col(h) = (squares / views - (sum / views).square()).max(0.0F).rowwise().sum();
+      const float share = 1.0F / static_cast<float>(pictures.size());
+      variance.col(h) = (squares * share - (sum * share).square()).max(0.0F).rowwise().sum();
       progress.advance(1);
     }
   });
