@@ -59,7 +59,9 @@ std::vector<Found> sweep(const std::vector<Eigen::ArrayX3f>& pictures,
                          double highest,
                          Progress& progress) {
   const int count = 1 + static_cast<int>(std::lround((highest - lowest) / kSweepStep));
-  const LayerStack places(frame.width, frame.height, {0.0F});
+  const auto moved = [&frame](int texel, const Eigen::Vector2i& steps) {
+    return moved_in_tile(frame.width, frame.height, texel, steps);
+  };
   Eigen::ArrayXXf variance(frame.texel_count(), count);
   progress.start("heights", count);
   parallel_for(count, 1, [&](std::int64_t begin, std::int64_t end) {
@@ -70,7 +72,7 @@ std::vector<Found> sweep(const std::vector<Eigen::ArrayX3f>& pictures,
       for (std::size_t v = 0; v < pictures.size(); ++v) {
         const Eigen::Vector2i steps = LayerStack::steps(height, frame.views[v]);
         for (int texel = 0; texel < frame.texel_count(); ++texel) {
-          const auto value = pictures[v].row(places.moved(texel, -steps));
+          const auto value = pictures[v].row(moved(texel, -steps));
           sum.row(texel) += value;
           squares.row(texel) += value.square();
         }
@@ -88,7 +90,7 @@ std::vector<Found> sweep(const std::vector<Eigen::ArrayX3f>& pictures,
     // Over a texel and its neighbours, since one alone is a few numbers.
     Eigen::ArrayXf around = Eigen::ArrayXf::Zero(count);
     for (int y = -1; y <= 1; ++y)
-      for (int x = -1; x <= 1; ++x) around += variance.row(places.moved(texel, {x, y})).transpose();
+      for (int x = -1; x <= 1; ++x) around += variance.row(moved(texel, {x, y})).transpose();
     Eigen::Index best = 0;
     const float least = around.minCoeff(&best);
     std::copy(around.begin(), around.end(), row.begin());

@@ -116,12 +116,15 @@ Eigen::Vector2i LayerStack::steps(double rise, const Direction& direction) {
           static_cast<int>(std::floor(-shift * direction.y() + 0.5))};
 }
 
-int LayerStack::moved(int texel, const Eigen::Vector2i& steps, const TexelMap* map) const {
-  const int width = map != nullptr ? map->width() : width_;
-  const int height = map != nullptr ? map->height() : height_;
+int moved_in_tile(int width, int height, int texel, const Eigen::Vector2i& steps) {
   const int column = wrapped(texel % width + steps.x(), width);
   const int row = wrapped(texel / width + steps.y(), height);
   return row * width + column;
+}
+
+int LayerStack::moved(int texel, const Eigen::Vector2i& steps, const TexelMap* map) const {
+  return map != nullptr ? moved_in_tile(map->width(), map->height(), texel, steps)
+                        : moved_in_tile(width_, height_, texel, steps);
 }
 
 double LayerStack::arriving(int layer,

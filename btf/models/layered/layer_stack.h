@@ -27,6 +27,9 @@ struct LayerPoint {
   Eigen::Vector3f normal{0.0F, 0.0F, 1.0F};            ///< N, unit, local frame
 };
 
+/// The texel so many columns and rows from another, around the edges of a tile.
+[[nodiscard]] int moved_in_tile(int width, int height, int texel, const Eigen::Vector2i& steps);
+
 /// Numbers of a stored point: K_d, a; K_s, k; C, L_d; N.
 inline constexpr int kLayerValues = 15;
 

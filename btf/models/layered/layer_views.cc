@@ -40,9 +40,7 @@ LayerViews::LayerViews(const SampleSet& set, const FittedPairs& pairs, std::vect
 }
 
 int LayerViews::moved(int texel, const Eigen::Vector2i& steps) const {
-  const auto wrapped = [](int value, int size) { return ((value % size) + size) % size; };
-  return wrapped(texel / frame_.width + steps.y(), frame_.height) * frame_.width +
-         wrapped(texel % frame_.width + steps.x(), frame_.width);
+  return moved_in_tile(frame_.width, frame_.height, texel, steps);
 }
 
 void LayerViews::set_points(int layer, std::vector<LayerPoint> points) {
