@@ -75,6 +75,22 @@ Status write_traced(const Tracer& tracer,
   return writer.finish();
 }
 
+// @param tracer_of  Tracer(field), of what the material makes
+template <class Material, class TracerOf>
+Status synthesize_with(const Material& material,
+                       const std::filesystem::path& out,
+                       const SynthesisOptions& options,
+                       Progress& progress,
+                       const TracerOf& tracer_of) {
+  VENEER_TRY(options.check());
+  const auto field = material.make(options.size, options.seed);
+  VENEER_TRY(field.check());
+  VENEER_ASSIGN(
+      btf::SampleSetWriter writer,
+      btf::SampleSetWriter::create(out, info_of(material.name, field.tile_width_mm, options)));
+  return write_traced(tracer_of(field), material.name, options, writer, progress);
+}
+
 }  // namespace
 
 std::span<const HeightFieldMaterial> height_field_materials() { return kMaterials; }
@@ -95,28 +111,18 @@ Status synthesize(const HeightFieldMaterial& material,
                   const std::filesystem::path& out,
                   const SynthesisOptions& options,
                   Progress& progress) {
-  VENEER_TRY(options.check());
-  const HeightField field = material.make(options.size, options.seed);
-  VENEER_TRY(field.check());
-  VENEER_ASSIGN(
-      btf::SampleSetWriter writer,
-      btf::SampleSetWriter::create(out, info_of(material.name, field.tile_width_mm, options)));
-  const Tracer tracer(field, options, progress);
-  return write_traced(tracer, material.name, options, writer, progress);
+  return synthesize_with(material, out, options, progress, [&](const HeightField& field) {
+    return Tracer(field, options, progress);
+  });
 }
 
 Status synthesize(const BodyMaterial& material,
                   const std::filesystem::path& out,
                   const SynthesisOptions& options,
                   Progress& progress) {
-  VENEER_TRY(options.check());
-  const BodyField field = material.make(options.size, options.seed);
-  VENEER_TRY(field.check());
-  VENEER_ASSIGN(
-      btf::SampleSetWriter writer,
-      btf::SampleSetWriter::create(out, info_of(material.name, field.tile_width_mm, options)));
-  const Tracer tracer(field, options);
-  return write_traced(tracer, material.name, options, writer, progress);
+  return synthesize_with(material, out, options, progress, [&](const BodyField& field) {
+    return Tracer(field, options);
+  });
 }
 
 }  // namespace veneer::simulation
