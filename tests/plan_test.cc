@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/testing/temporary_folder.h"
-#include "calibration/profile.h"
+#include "tests/facing_projector.h"
 #include "tests/program.h"
 
 namespace veneer {
@@ -17,22 +17,7 @@ using nlohmann::json;
 /// A small projector that faces the plate of etc/plan/scene.toml.
 class PlanTest : public ::testing::Test {
  protected:
-  void SetUp() override {
-    calibration::ProjectorProfile profile;
-    auto& g = profile.geometry;
-    g.width = 160;
-    g.height = 120;
-    g.fx = g.fy = 200;
-    g.cx = 80;
-    g.cy = 60;
-    g.world_from_projector.translation = {0, 0, 1};
-    g.world_from_projector.rotation = Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX());
-    for (auto& curve : profile.tone_curves)
-      for (int code = 0; code < 256; ++code) curve.push_back(code / 255.0);
-    profile.primaries << 82, 71, 36, 42, 143, 14, 4, 24, 190;
-    profile.vignetting = Image<float>(1, 1, 1.0F);
-    ASSERT_TRUE(profile.save(profile_));
-  }
+  void SetUp() override { ASSERT_TRUE(facing_projector(160, 120).save(profile_)); }
 
   [[nodiscard]] std::string synthesized(const std::string& material) const {
     const fs::path set = folder_.path() / (material + ".btfset");

@@ -20,9 +20,9 @@
 #include "base/testing/temporary_folder.h"
 #include "btf/material.h"
 #include "btf/sample_set.h"
-#include "calibration/profile.h"
 #include "quality/candidate.h"
 #include "quality/ladder.h"
+#include "tests/facing_projector.h"
 #include "tests/program.h"
 
 extern char** environ;  // NOLINT(readability-redundant-declaration): POSIX leaves it to us
@@ -51,21 +51,7 @@ class TradeTest : public ::testing::Test {
         value = Eigen::half(static_cast<float>(0.1 + 0.5 * random.uniform()));
     ASSERT_TRUE(writer->finish());
 
-    calibration::ProjectorProfile profile;
-    auto& g = profile.geometry;
-    g.width = 64;
-    g.height = 48;
-    g.fx = g.fy = 80;
-    g.cx = 32;
-    g.cy = 24;
-    // At 1 m in front of the object, looking at it.
-    g.world_from_projector.translation = {0, 0, 1};
-    g.world_from_projector.rotation = Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX());
-    for (auto& curve : profile.tone_curves)
-      for (int code = 0; code < 256; ++code) curve.push_back(code / 255.0);
-    profile.primaries << 82, 71, 36, 42, 143, 14, 4, 24, 190;
-    profile.vignetting = Image<float>(1, 1, 1.0F);
-    ASSERT_TRUE(profile.save(profile_));
+    ASSERT_TRUE(facing_projector(64, 48).save(profile_));
     ASSERT_TRUE(write_text(scene_,
                            "mesh = \"plate\"\ntexture_repeats = [4, 4]\n"
                            "[observer.region]\nradius_m = [1, 1.2]\nazimuth_deg = [-20, 20]\n"
