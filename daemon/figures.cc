@@ -50,7 +50,7 @@ void FigureBoard::post(const FrameFigures& figures) {
   put(figures.gpu_ms);
   put(static_cast<std::uint64_t>(figures.late ? 1 : 0));
   put(static_cast<std::uint64_t>(figures.dark ? 1 : 0));
-  put(figures.dropped);
+  put(figures.missed);
   for (double LatencyBudget::*column : kColumns) put(figures.latency_ms.*column);
   slot.stamp.store(2 * number + 2, std::memory_order_release);
   dropped_.store(figures.dropped, std::memory_order_relaxed);
@@ -77,7 +77,7 @@ std::vector<FrameFigures> FigureBoard::after(Time since) const {
     figures.gpu_ms = std::bit_cast<double>(words[2]);
     figures.late = words[3] != 0;
     figures.dark = words[4] != 0;
-    figures.dropped = words[5];
+    figures.missed = words[5];
     for (std::size_t i = 0; i < kColumns.size(); ++i)
       figures.latency_ms.*kColumns[i] = std::bit_cast<double>(words[6 + i]);
     found.push_back(figures);
@@ -113,10 +113,14 @@ FigureBoard::Figures FigureBoard::last_second(Time now) const {
 std::optional<double> FigureBoard::late_part(Time now, Duration span) const {
   const std::vector<FrameFigures> frames = after(now - span);
   if (frames.empty()) return std::nullopt;
-  double late = 0;
-  for (const FrameFigures& frame : frames) late += frame.late ? 1 : 0;
-  const auto dropped = static_cast<double>(frames.front().dropped - frames.back().dropped);
-  return (late + dropped) / (static_cast<double>(frames.size()) + dropped);
+  std::uint64_t late = 0;
+  std::uint64_t missed = 0;
+  for (const FrameFigures& frame : frames) {
+    if (frame.dark) continue;
+    late += frame.late ? 1 : 0;
+    missed += frame.missed;
+  }
+  return static_cast<double>(late + missed) / static_cast<double>(frames.size() + missed);
 }
 
 }  // namespace veneer::daemon

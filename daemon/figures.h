@@ -20,7 +20,8 @@ struct FrameFigures {
   double frame_ms = 0;
   double gpu_ms = std::numeric_limits<double>::quiet_NaN();  ///< NaN where nobody knows
   bool late = false;             ///< it took longer than a period, or missed its refresh
-  bool dark = false;             ///< nothing was drawn: it counts, and tells nothing of times
+  bool dark = false;             ///< nothing was shown: it counts, and tells nothing of times
+  std::uint64_t missed = 0;      ///< refreshes that passed for want of this frame
   std::uint64_t dropped = 0;     ///< refreshes for which no frame was ready, since the start
   std::uint64_t late_total = 0;  ///< late frames, likewise
   service::LatencyBudget latency_ms;
@@ -46,8 +47,9 @@ class FigureBoard {
   };
   /// Of the frames of the second before `now`.
   [[nodiscard]] Figures last_second(Time now) const;
-  /// The part of the refreshes within `span` before `now` that had a late frame or none; 0 to 1.
-  /// Nothing where no frame was done in that time: one may be under way.
+  /// The part of the refreshes within `span` before `now` that had a late frame or none; 0 to 1. A
+  /// frame that was dark, or that the output refused, came in time: what kept it away has a name of
+  /// its own. Nothing where no frame was done in that time: one may be under way.
   [[nodiscard]] std::optional<double> late_part(Time now, Duration span) const;
   /// The rung of the quality on which the last frame was drawn, or which is faded to.
   void set_rung(std::size_t rung) { rung_.store(rung, std::memory_order_relaxed); }

@@ -66,12 +66,30 @@ TEST(FigureBoard, CountsLateFramesAndDroppedOnesAlike) {
   for (int i = 0; i < 100; ++i) {
     FrameFigures figures = frame_at(Time{i * 20ms + 1ms}, 1);
     figures.late = i % 4 == 0;
-    figures.dropped = static_cast<std::uint64_t>(i);  // one between any two
+    figures.missed = i > 0 ? 1 : 0;  // one between any two
     board.post(figures);
   }
   EXPECT_NEAR(board.late_part(Time{2s}, 3s).value(), (25 + 99) / 199.0, 1e-12);
   // Nobody knows how the frame goes that takes longer than that.
   EXPECT_EQ(board.late_part(Time{5s}, 3s), std::nullopt);
+}
+
+TEST(FigureBoard, NoFrameIsLateThatTheDisplayRefused) {
+  FigureBoard board;
+  std::uint64_t dropped = 0;
+  const auto post = [&](int i, bool refused) {
+    FrameFigures figures = frame_at(Time{i * 20ms}, 1);
+    figures.late = true;
+    figures.dark = refused;
+    figures.missed = 1;
+    figures.dropped = dropped += refused ? 2 : 1;
+    board.post(figures);
+  };
+  for (int i = 1; i <= 50; ++i) post(i, false);
+  EXPECT_EQ(board.late_part(Time{1s}, 3s).value(), 1);
+  for (int i = 51; i <= 200; ++i) post(i, true);
+  EXPECT_EQ(board.late_part(Time{4s}, 3s).value(), 0);
+  EXPECT_EQ(board.last_second(Time{4s}).dropped, 350U);
 }
 
 TEST(FigureBoard, AnotherThreadNeverSeesHalfAFrame) {

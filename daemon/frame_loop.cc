@@ -102,10 +102,9 @@ void FrameLoop::follow_output() {
 
 FrameLoop::Slot FrameLoop::next_slot(std::uint64_t number) {
   const Duration latency = from_seconds(show_->script.config.display_latency_ms * 1e-3);
-  if (!pacer_) return {start_, start_ + latency};
+  if (!pacer_) return {start_, start_ + latency, 0};
   const Pacer::Plan plan = pacer_->plan(number, parts_.clock.now());
-  run_.dropped += plan.skipped;
-  return {plan.wake, plan.refresh + latency};
+  return {plan.wake, plan.refresh + latency, plan.skipped};
 }
 
 void FrameLoop::start_over() {
@@ -338,6 +337,7 @@ void FrameLoop::give_snapshot(bool dark) {
 void FrameLoop::account(const Slot& slot, Made made, FrameRecord& record) {
   ++run_.count;
   FrameFigures figures;
+  figures.missed = slot.missed;
   if (made == Made::kShown) {
     if (run_.frames.size() < kRememberedFrames) {
       run_.frames.push_back(record);
@@ -364,10 +364,11 @@ void FrameLoop::account(const Slot& slot, Made made, FrameRecord& record) {
     start_ += period_;
     if (const Time now = parts_.clock.now(); now > start_) {
       const auto missed = (now - start_) / period_ + 1;
-      run_.dropped += static_cast<std::uint64_t>(missed);
+      figures.missed += static_cast<std::uint64_t>(missed);
       start_ += missed * period_;
     }
   }
+  run_.dropped += figures.missed;
   if (figures.late) ++run_.late;
   if (parts_.clock.now() - slot.wake > kStall) start_over();
   figures.done = parts_.clock.now();

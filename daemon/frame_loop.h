@@ -99,6 +99,7 @@ class FrameLoop {
   struct Slot {
     Time wake;
     Time display;
+    std::uint64_t missed = 0;  ///< refreshes since the frame before
   };
   enum class Made { kShown, kDark, kDropped, kClosed };
 

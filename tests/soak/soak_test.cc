@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The daemon, left alone with everything that can go wrong. How long: VENEER_SOAK_MINUTES of
-// virtual time, VENEER_SOAK_REAL_MINUTES of real time; ./dev soak runs an hour of the first.
+// virtual time, VENEER_SOAK_REAL_MINUTES of real time; ./dev soak runs an hour of the first. What
+// goes wrong and when: VENEER_SOAK_SEED.
 #include "tests/soak/soak.h"
 
 #include <gtest/gtest.h>
@@ -15,9 +16,18 @@ namespace {
 
 constexpr double kCeiling_nits = 250;
 
-double minutes_of(const char* variable, double otherwise) {
+double number_of(const char* variable, double otherwise) {
   const char* given = std::getenv(variable);
   return given != nullptr ? std::strtod(given, nullptr) : otherwise;
+}
+
+SoakOptions soak_options(const char* minutes_variable, double minutes) {
+  SoakOptions options;
+  options.ceiling_nits = kCeiling_nits;
+  options.seconds = 60 * number_of(minutes_variable, minutes);
+  options.seed =
+      static_cast<std::uint64_t>(number_of("VENEER_SOAK_SEED", static_cast<double>(options.seed)));
+  return options;
 }
 
 /// Why nothing can be drawn here; empty where it can.
@@ -118,9 +128,7 @@ TEST(Soak, TheCeilingIsNeeded) {
 
 TEST(Soak, EnduresVirtualTime) {
   if (const std::string why = no_gl(); !why.empty()) GTEST_SKIP() << why;
-  SoakOptions options;
-  options.ceiling_nits = kCeiling_nits;
-  options.seconds = 60 * minutes_of("VENEER_SOAK_MINUTES", 4);
+  const SoakOptions options = soak_options("VENEER_SOAK_MINUTES", 4);
   const auto soak = Soak::create(options);
   ASSERT_TRUE(soak) << soak.error().what;
   const auto result = (*soak)->run();
@@ -135,10 +143,8 @@ TEST(Soak, EnduresVirtualTime) {
 // does.
 TEST(Soak, EnduresRealTime) {
   if (const std::string why = no_gl(); !why.empty()) GTEST_SKIP() << why;
-  SoakOptions options;
+  SoakOptions options = soak_options("VENEER_SOAK_REAL_MINUTES", 2);
   options.virtual_time = false;
-  options.ceiling_nits = kCeiling_nits;
-  options.seconds = 60 * minutes_of("VENEER_SOAK_REAL_MINUTES", 2);
   options.pause_s = 1;
   const auto soak = Soak::create(options);
   ASSERT_TRUE(soak) << soak.error().what;
