@@ -21,9 +21,9 @@ DATA_ABSENT = "real data absent"
 
 def case_outcome(case):
     """("passed" | "failed" | "skipped", why) of one <testcase>, of GoogleTest or of ctest."""
-    failure = case.find("failure")
-    if failure is not None:
-        return "failed", failure.get("message", "")
+    failures = case.findall("failure")
+    if failures:
+        return "failed", "; ".join(failure.get("message", "") for failure in failures)
     skipped = case.find("skipped")
     if skipped is not None:
         return "skipped", skipped.get("message", "")

@@ -51,6 +51,11 @@ class TestSummary(unittest.TestCase):
         self.assertEqual((status, last), (1, "0 passed, 1 failed, 0 skipped"))
         self.assertIn("failed: Law.A: expected 1", lines)
 
+    def test_every_failure_of_a_case_is_told(self):
+        twice = FAILED.format("A", "run").replace("</testcase>", '<failure message="expected 2"/></testcase>')
+        _, _, lines = self.run_on({"ctest": [FAILED.format("base", "fail")], "base": [twice]})
+        self.assertIn("failed: Law.A: expected 1; expected 2", lines)
+
     def test_program_that_dies_without_results_is_a_failure(self):
         status, last, _ = self.run_on({"ctest": [FAILED.format("base", "fail")]})
         self.assertEqual((status, last), (1, "0 passed, 1 failed, 0 skipped"))
