@@ -95,6 +95,18 @@ TEST_F(RealTimeDaemonTest, RecoversFromALostGpuOnTheLoadersThread) {
   end();
 }
 
+TEST_F(RealTimeDaemonTest, AReloadWhileThereIsNoGpuWaitsForNoFrame) {
+  start();
+  hand_.renderer_refuses = true;
+  hand_.gpu_lost = true;
+  ASSERT_TRUE(wait_until([&] { return daemon_->status().state == State::kBlank; }));
+  const Status reloaded = daemon_->reload();
+  EXPECT_TRUE(reloaded) << reloaded.error().what;
+  hand_.renderer_refuses = false;
+  EXPECT_TRUE(wait_until([&] { return daemon_->status().state == State::kRunning; }));
+  end();
+}
+
 TEST_F(RealTimeDaemonTest, BlankReturnsWhenItIsDark) {
   start();
   EXPECT_TRUE(daemon_->blank(true));

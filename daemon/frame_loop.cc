@@ -123,29 +123,61 @@ void FrameLoop::notice_sleep() {
   start_over();
 }
 
+// What is wrong with the poses that the picture needs.
+FrameLoop::PoseTrouble FrameLoop::pose_trouble(Time now) const {
+  const auto silent = [this, now](tracking::BodyId body) {
+    const std::optional<Time> last = parts_.poses.last_sample(body);
+    return !last || now - *last > kSilence;
+  };
+  if (parts_.poses.lost()) return PoseTrouble::kTracker;
+  const int object = show_->script.scene.object_body;
+  const bool no_object = object >= 0 && silent(object);
+  const bool no_observer = std::ranges::all_of(show_->observers.bodies(), silent);
+  if (no_object && no_observer) return PoseTrouble::kAll;
+  if (no_object) return PoseTrouble::kObject;
+  return no_observer ? PoseTrouble::kObserver : PoseTrouble::kNone;
+}
+
 void FrameLoop::notice_tracker() {
-  const std::optional<Time> last = parts_.poses.last_sample();
   const Time now = parts_.clock.now();
-  const bool bad = parts_.poses.lost() || !last || now - *last > kSilence;
-  if (bad == tracker_bad_) return;
-  tracker_bad_ = bad;
-  if (!bad) {
+  const PoseTrouble trouble = pose_trouble(now);
+  if (trouble == pose_trouble_) return;
+  pose_trouble_ = trouble;
+  if (trouble == PoseTrouble::kNone) {
     parts_.faults.end(FaultKind::kTracker, now);
     return;
   }
-  const Status health = parts_.poses.health();
+  const auto text = [&]() -> std::string {
+    const int object = show_->script.scene.object_body;
+    switch (trouble) {
+      case PoseTrouble::kObject:
+        return fmt::format(
+            "no pose of the object (body {}) has come for a second: is it seen by the tracker?",
+            object);
+      case PoseTrouble::kObserver:
+        return fmt::format(
+            "no pose of the observer (body {}) has come for a second: is the tracker on and he in "
+            "its range?",
+            fmt::join(show_->observers.bodies(), " or "));
+      case PoseTrouble::kTracker:
+        if (const Status health = parts_.poses.health(); !health) return health.error().what;
+        [[fallthrough]];
+      default:
+        return "no pose has come for a second: is the tracker on and in range?";
+    }
+  };
   parts_.faults.begin(
       FaultKind::kTracker,
       now,
-      fmt::format("{}; the picture stays as for the last pose, without highlights",
-                  health ? "no pose has come for a second: is the tracker on and in range?"
-                         : health.error().what));
+      fmt::format("{}; the picture stays as for the last pose, without highlights", text()));
 }
 
 // --- between two frames
 
 void FrameLoop::between_frames() {
-  if (show_->profiles && show_->renderer && !show_->lost) show_->profiles->apply(*show_->renderer);
+  const bool drawing = show_->renderer && !show_->lost;
+  if (show_->profiles && drawing) show_->profiles->apply(*show_->renderer);
+  parts_.loader.set_drawing(drawing);
   const std::size_t rung = show_->governor.rung();
   if (parts_.loader.take_next(show_)) show_->governor.begin_on(rung);
 }
@@ -208,9 +240,12 @@ render::FrameInput FrameLoop::look(const Slot& slot, FrameRecord& record) {
   input.dither_seed = static_cast<std::uint32_t>(record.number);
   input.specular_weight = record.specular_weight;
   if (scene.object_body >= 0) {
-    const tracking::PoseEstimate object = parts_.poses.at(scene.object_body, slot.display);
-    input.world_from_object =
-        show_->object.update(object, slot.display).world_from_body * scene.world_from_object;
+    const tracking::BodyView object =
+        show_->object.update(parts_.poses.at(scene.object_body, slot.display), slot.display);
+    input.world_from_object = object.world_from_body * scene.world_from_object;
+    // Nor does anybody know where the highlight is on an object that has gone.
+    record.specular_weight = std::min(record.specular_weight, object.certainty);
+    input.specular_weight = record.specular_weight;
   }
   return input;
 }

@@ -108,6 +108,8 @@ class FrameLoop {
   [[nodiscard]] Slot next_slot(std::uint64_t number);
   void start_over();
   void notice_sleep();
+  enum class PoseTrouble { kNone, kTracker, kAll, kObserver, kObject };
+  [[nodiscard]] PoseTrouble pose_trouble(Time now) const;
   void notice_tracker();
   void between_frames();
   [[nodiscard]] bool keep_output();
@@ -134,7 +136,7 @@ class FrameLoop {
   bool dark_ = false;  // and the output knows
   bool dark_failed_ = false;
   Time dark_told_;
-  bool tracker_bad_ = false;
+  PoseTrouble pose_trouble_ = PoseTrouble::kNone;
   Duration slept_before_{};  // of CLOCK_BOOTTIME over CLOCK_MONOTONIC
 };
 

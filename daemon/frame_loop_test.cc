@@ -36,8 +36,13 @@ class FrameLoopTest : public ::testing::Test {
   Result<RunRecord> run(Clock& clock,
                         std::unique_ptr<tracking::Tracker> tracker,
                         std::unique_ptr<projector::Output> output) {
-    PoseFeed poses(
-        std::move(tracker), {}, clock, config_.clock, {0}, config_.prediction, config_.validation);
+    PoseFeed poses(std::move(tracker),
+                   {},
+                   clock,
+                   config_.clock,
+                   bodies_,
+                   config_.prediction,
+                   config_.validation);
     Faults faults;
     FigureBoard board;
     Wishes wishes;
@@ -69,6 +74,7 @@ class FrameLoopTest : public ::testing::Test {
                    std::move(show));
     SilentProgress silent;
     Result<RunRecord> record = loop.run(stop_, silent);
+    faults_ = faults.list();
     inputs_ = renderer->inputs;
     if (counting != nullptr && keeper.get() == counting) times_ = counting->times;
     loader.stop(loop.take_show());
@@ -76,6 +82,8 @@ class FrameLoopTest : public ::testing::Test {
   }
 
   Config config_;
+  std::vector<tracking::BodyId> bodies_{0};
+  std::vector<service::Fault> faults_;  ///< at the end of the last run
   render::Scene scene_;
   VirtualClock clock_;
   Stagehand hand_;
@@ -160,6 +168,57 @@ TEST_F(FrameLoopTest, SaysWhereTheTimeFromPoseToLightWent) {
     EXPECT_EQ(frame.latency_ms.gpu_draw, 0.3);
     EXPECT_NEAR(frame.latency_ms.compensate, 0.2, 1e-12);
     EXPECT_NEAR(frame.latency_ms.display, 10, 1e-9);
+  }
+}
+
+/// Bodies 0 and 1, each measured every 4 ms; one of them is covered from some moment on.
+class TwoBodies final : public tracking::Tracker {
+ public:
+  TwoBodies(Clock& clock, tracking::BodyId covered, Time since)
+      : clock_(clock), covered_(covered), since_(since) {}
+  std::string description() const override { return "two bodies"; }
+  Result<tracking::PoseSample> wait_pose(Duration timeout) override {
+    const Time deadline = clock_.now() + timeout;
+    tracking::PoseSample sample;
+    do {
+      sample.body = static_cast<tracking::BodyId>(++turn_ % 2);
+      sample.time = Time{static_cast<Duration::rep>(turn_ / 2) * Duration(4ms)};
+    } while (sample.body == covered_ && sample.time >= since_);
+    if (sample.time > deadline) {
+      --turn_;
+      clock_.sleep_until(deadline);
+      return fail(Errc::kTimeout, "nothing yet");
+    }
+    clock_.sleep_until(sample.time);
+    sample.sequence = ++turns_of_[static_cast<std::size_t>(sample.body)];
+    return sample;
+  }
+
+ private:
+  Clock& clock_;
+  tracking::BodyId covered_;
+  Time since_;
+  std::uint64_t turn_ = 1;
+  std::array<std::uint64_t, 2> turns_of_{};
+};
+
+TEST_F(FrameLoopTest, ACoveredObjectIsAFaultAndTakesTheHighlightsLikeACoveredObserver) {
+  bodies_ = {0, 1};
+  scene_.object_body = 1;
+  config_.frames = 150;  // three seconds
+  for (const auto& [covered, name] : {std::pair{0, "observer (body 0)"}, {1, "object (body 1)"}}) {
+    VirtualClock clock;
+    const RunRecord record =
+        run(clock,
+            std::make_unique<TwoBodies>(clock, static_cast<tracking::BodyId>(covered), Time{500ms}),
+            std::make_unique<FakeOutput>(hand_))
+            .value();
+    EXPECT_EQ(record.frames.at(20).specular_weight, 1) << name;
+    EXPECT_EQ(record.frames.back().specular_weight, 0) << name;
+    EXPECT_EQ(inputs_.back().specular_weight, 0) << name;
+    ASSERT_EQ(faults_.size(), 1U) << name;
+    EXPECT_EQ(faults_[0].kind, service::FaultKind::kTracker);
+    EXPECT_NE(faults_[0].text.find(name), std::string::npos) << faults_[0].text;
   }
 }
 

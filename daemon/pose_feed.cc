@@ -171,21 +171,23 @@ void PoseFeed::take(tracking::PoseSample sample, Time arrived) {
     ++rejected_;
     return;
   }
-  const Time ready = clock_.now();
-  body->note({sample.time, arrived, ready});
+  body->note({sample.time, arrived, clock_.now()});
   backoff_.succeeded();
-  last_sample_.store(ticks(ready), std::memory_order_relaxed);
-  any_sample_.store(true, std::memory_order_release);
 }
 
 void PoseFeed::watch_state() {
   using tracking::TrackerState;
-  tracking::TrackerStatus status = tracker_->status();
-  const std::scoped_lock lock(health_mutex_);
-  if (!events_.empty() && events_.back().state == status.state &&
-      events_.back().detail == status.detail) {
-    return;
+  const tracking::TrackerStatus status = tracker_->status();
+  {
+    const std::scoped_lock lock(health_mutex_);
+    if (!events_.empty() && events_.back().state == status.state &&
+        events_.back().detail == status.detail) {
+      return;
+    }
+    if (events_.size() == kRememberedEvents) events_.pop_front();
+    events_.push_back({clock_.now(), status.state, status.detail});
   }
+  // Without the lock: the log may wait for its disk, and the frame loop asks for health().
   const bool bad = status.state == TrackerState::kAbsent || status.state == TrackerState::kFailed ||
                    status.state == TrackerState::kSilent;
   spdlog::log(bad ? spdlog::level::warn : spdlog::level::info,
@@ -193,8 +195,6 @@ void PoseFeed::watch_state() {
               name_of(status.state),
               status.detail.empty() ? "" : ": ",
               status.detail);
-  if (events_.size() == kRememberedEvents) events_.pop_front();
-  events_.push_back({clock_.now(), status.state, std::move(status.detail)});
 }
 
 std::vector<TrackerEvent> PoseFeed::events() const {
@@ -237,9 +237,12 @@ std::optional<SampleTimes> PoseFeed::newest(tracking::BodyId body) const {
   return track == nullptr ? std::nullopt : track->times();
 }
 
-std::optional<Time> PoseFeed::last_sample() const {
-  if (!any_sample_.load(std::memory_order_acquire)) return std::nullopt;
-  return Time{Duration{last_sample_.load(std::memory_order_relaxed)}};
+std::optional<Time> PoseFeed::last_sample(tracking::BodyId body) const {
+  const BodyTrack* track = find(body);
+  constexpr std::uint32_t kFirstWritten = 2;
+  if (track == nullptr || track->turn.load(std::memory_order_acquire) < kFirstWritten)
+    return std::nullopt;
+  return Time{Duration{track->ready.load(std::memory_order_relaxed)}};
 }
 
 Status PoseFeed::health() const {

@@ -73,8 +73,8 @@ class PoseFeed {
   [[nodiscard]] bool lost() const { return lost_; }
   /// The same, and why.
   [[nodiscard]] Status health() const;
-  /// When the last sample was taken, of whatever body; nothing before the first. Never waits.
-  [[nodiscard]] std::optional<Time> last_sample() const;
+  /// When the last sample of a body was taken; nothing before the first. Never waits.
+  [[nodiscard]] std::optional<Time> last_sample(tracking::BodyId body) const;
   /// The last kRememberedEvents changes of the tracker's state; each was logged too.
   [[nodiscard]] std::vector<TrackerEvent> events() const;
   static constexpr std::size_t kRememberedEvents = 1000;
@@ -108,8 +108,6 @@ class PoseFeed {
   std::atomic<std::size_t> track_count_{0};
   std::atomic<std::uint64_t> rejected_{0};
   std::atomic<std::uint64_t> reopened_{0};
-  std::atomic<Duration::rep> last_sample_{0};
-  std::atomic<bool> any_sample_{false};
   mutable std::mutex health_mutex_;
   Status health_;
   std::deque<TrackerEvent> events_;

@@ -105,7 +105,7 @@ TEST_F(PoseFeedTest, KnowsTheWayOfTheNewestSample) {
   ASSERT_TRUE(times);
   EXPECT_LE(times->measured, times->arrived);
   EXPECT_LE(times->arrived, times->ready);
-  EXPECT_EQ(times->ready, poses.last_sample());
+  EXPECT_EQ(times->ready, poses.last_sample(0));
 }
 
 }  // namespace

@@ -66,12 +66,20 @@ void ProfileWatcher::answer(const Status& status) {
   answered_.notify_all();
 }
 
-Status ProfileWatcher::check(std::chrono::milliseconds patience) {
+Status ProfileWatcher::check(std::chrono::milliseconds patience,
+                             const std::function<bool()>& drawing) {
   std::unique_lock lock(answer_mutex_);
   const std::uint64_t before = answers_;
+  const SteadyClockPoint deadline = std::chrono::steady_clock::now() + patience;
   asked_ = true;
-  if (!answered_.wait_for(lock, patience, [&] { return answers_ != before; }))
-    return fail(Errc::kTimeout, "reading the projector profile anew: no frame took it in time");
+  while (!answered_.wait_until(lock,
+                               std::min(deadline, std::chrono::steady_clock::now() + kFlagInterval),
+                               [&] { return answers_ != before; })) {
+    if (!drawing())
+      return fail(Errc::kUnavailable, "reading the projector profile anew: no frames are drawn");
+    if (std::chrono::steady_clock::now() >= deadline)
+      return fail(Errc::kTimeout, "reading the projector profile anew: no frame took it in time");
+  }
   return last_answer_;
 }
 

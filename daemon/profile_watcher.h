@@ -57,8 +57,11 @@ class ProfileWatcher {
   ProfileWatcher& operator=(const ProfileWatcher&) = delete;
 
   /// Reads the folder, changed or not, and waits until frames are drawn with what is there.
-  /// Errors: why it was refused; kTimeout where no frame took it within `patience`.
-  [[nodiscard]] Status check(std::chrono::milliseconds patience);
+  /// @param drawing  whether frames are drawn; where they are not, none is waited for
+  /// Errors: why it was refused; kTimeout where no frame took it within `patience`; kUnavailable
+  /// where none is drawn.
+  [[nodiscard]] Status check(std::chrono::milliseconds patience,
+                             const std::function<bool()>& drawing);
   /// For the frame loop: gives a newly prepared profile, if there is one, to the renderer. Never
   /// waits, and allocates only what GL does.
   void apply(render::Renderer& renderer);

@@ -53,6 +53,8 @@ class RememberingRenderer final : public render::Renderer {
   bool refuses = false;
 };
 
+const auto kDrawing = [] { return true; };
+
 class ProfileWatcherTest : public testing::Test {
  protected:
   void SetUp() override { ASSERT_TRUE(store_.publish(profile_at(1))); }
@@ -153,7 +155,7 @@ TEST_F(ProfileWatcherTest, ReadsAtOnceWhenAskedEvenWhatDidNotChange) {
   ProfileWatcher watcher = watch(1h);
   ASSERT_TRUE(store_.publish(profile_at(2)));
   for (const std::size_t times : {1U, 2U}) {
-    auto answer = std::async(std::launch::async, [&] { return watcher.check(60s); });
+    auto answer = std::async(std::launch::async, [&] { return watcher.check(60s, kDrawing); });
     ASSERT_TRUE(
         frames_until(watcher, [&] { return answer.wait_for(0s) == std::future_status::ready; }));
     EXPECT_TRUE(answer.get());
@@ -164,13 +166,16 @@ TEST_F(ProfileWatcherTest, ReadsAtOnceWhenAskedEvenWhatDidNotChange) {
 TEST_F(ProfileWatcherTest, SaysWhyWhatWasAskedForIsRefused) {
   ProfileWatcher watcher = watch(1h);
   ASSERT_TRUE(store_.publish(profile_at(2, 17)));
-  const Status refused = watcher.check(60s);
+  const Status refused = watcher.check(60s, kDrawing);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, Errc::kInvalidOption);
   ASSERT_TRUE(store_.publish(profile_at(2)));
-  const Status nobody_draws = watcher.check(300ms);
+  const Status nobody_draws = watcher.check(300ms, kDrawing);
   ASSERT_FALSE(nobody_draws);
   EXPECT_EQ(nobody_draws.error().code, Errc::kTimeout);
+  const Status cannot_draw = watcher.check(60s, [] { return false; });
+  ASSERT_FALSE(cannot_draw);
+  EXPECT_EQ(cannot_draw.error().code, Errc::kUnavailable);
 }
 
 TEST_F(ProfileWatcherTest, SaysOnceThatTheFolderIsGoneAndThatItIsBack) {

@@ -221,12 +221,17 @@ Status ShowLoader::exchange(Script next) {
 }
 
 Status ShowLoader::check_profile() {
-  if (shown_ != nullptr && shown_->profiles)
-    return shown_->profiles->check(
-        std::chrono::duration_cast<std::chrono::milliseconds>(kPatience));
+  if (shown_ != nullptr && shown_->profiles) {
+    // The thread that waits here is the one that would make a lost renderer anew.
+    const auto drawing = [this] { return drawing_.load(); };
+    const Status checked = shown_->profiles->check(
+        std::chrono::duration_cast<std::chrono::milliseconds>(kPatience), drawing);
+    if (checked || checked.error().code != Errc::kUnavailable) return checked;
+  }
   Script script = current_;
   VENEER_TRY(read_profile(script, nullptr));
-  return exchange(std::move(script));
+  if (drawing_) return exchange(std::move(script));
+  return render::check_exchangeable(current_.raster(), script.profile);
 }
 
 void ShowLoader::dispose_of_used() {

@@ -57,7 +57,8 @@ class ShowLoader {
   /// Draws with another script, and returns when the frame loop has taken it.
   /// Errors: those of the renderer; kInvalidOption (another raster); kTimeout, kUnavailable.
   [[nodiscard]] Status exchange(Script next);
-  /// Reads the profile anew and gives it to the renderer as it is.
+  /// Reads the profile anew and gives it to the renderer as it is; while there is none, the next
+  /// one is made of what is in the folder then.
   [[nodiscard]] Status check_profile();
   /// Called by the loader's thread every now and then: what is to be looked after beside.
   void set_chore(std::function<void()> chore) { chore_ = std::move(chore); }
@@ -69,6 +70,8 @@ class ShowLoader {
   bool take_next(std::unique_ptr<Show>& show);
   /// The renderer of the current show is lost or gone: another is to be made. Never waits.
   void want_renderer();
+  /// Whether there is a renderer that can draw. Never waits.
+  void set_drawing(bool drawing) { drawing_ = drawing; }
   /// What the output offers to draw into; null where nothing. Not while an old one is in use.
   void set_scanout(const Scanout* scanout);
   /// Whether anything here still draws, or will, into the buffers that were set before.
@@ -128,6 +131,7 @@ class ShowLoader {
   std::atomic<Show*> next_{nullptr};
   std::atomic<Show*> used_{nullptr};
   std::atomic<bool> renderer_wanted_{false};
+  std::atomic<bool> drawing_{true};
   mutable std::mutex scanout_mutex_;
   const Scanout* scanout_ = nullptr;
   std::atomic<int> scanout_users_{0};
