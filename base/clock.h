@@ -45,4 +45,8 @@ class VirtualClock final : public Clock {
   std::atomic<Duration::rep> now_;
 };
 
+/// How long the machine has slept since it was started, while CLOCK_MONOTONIC stood still:
+/// CLOCK_BOOTTIME's lead. Two readings differ by less than a millisecond where it did not sleep.
+[[nodiscard]] Duration time_asleep();
+
 }  // namespace veneer

@@ -33,6 +33,12 @@ std::function<Result<double>()> pressure_of(const Devices& devices, ClockKind ki
   return memory_pressure;
 }
 
+std::function<Duration()> sleep_of(const Devices& devices, ClockKind kind) {
+  if (devices.time_asleep) return devices.time_asleep;
+  if (kind == ClockKind::kVirtual) return {};
+  return time_asleep;
+}
+
 class TheDaemon final : public Daemon {
  public:
   TheDaemon(ConfigFile file, Config config, Devices devices)
@@ -45,6 +51,7 @@ class TheDaemon final : public Daemon {
   [[nodiscard]] Result<Summary> run(const std::atomic<bool>& stop, Progress& progress) override;
   [[nodiscard]] service::ServiceStatus status() const override;
   [[nodiscard]] std::uint64_t frames() const override { return board_.frames(); }
+  [[nodiscard]] std::uint64_t turns() const override { return board_.turns(); }
   [[nodiscard]] Status load_material(const std::filesystem::path& material) override;
   [[nodiscard]] Status set_scene(const std::filesystem::path& scene) override;
   [[nodiscard]] Status set_light(int index, const service::LightSetting& light) override;
@@ -173,7 +180,8 @@ Result<Summary> TheDaemon::run(const std::atomic<bool>& stop, Progress& progress
                   faults_,
                   board_,
                   wishes_,
-                  devices_.before_frame},
+                  devices_.before_frame,
+                  sleep_of(devices_, config_.clock)},
                  std::move(show));
   published_ = &stage;
   const Result<RunRecord> record = loop.run(stop, progress);

@@ -107,6 +107,21 @@ TEST_F(RealTimeDaemonTest, AReloadWhileThereIsNoGpuWaitsForNoFrame) {
   end();
 }
 
+TEST_F(RealTimeDaemonTest, FramesThatTheDisplayRefusesDidNotGoOut) {
+  start();
+  hand_.output_away = true;
+  ASSERT_TRUE(wait_until([&] { return daemon_->status().state == State::kFault; }));
+  const std::uint64_t frames = daemon_->frames();
+  const std::uint64_t turns = daemon_->turns();
+  EXPECT_TRUE(wait_until([&] { return daemon_->turns() > turns + 300; }));
+  EXPECT_EQ(daemon_->frames(), frames);
+  EXPECT_EQ(daemon_->status().frames, frames);
+  EXPECT_EQ(daemon_->status().frame_rate_hz, 0);
+  hand_.output_away = false;
+  EXPECT_TRUE(wait_until([&] { return daemon_->frames() > frames + 10; }));
+  end();
+}
+
 TEST_F(RealTimeDaemonTest, BlankReturnsWhenItIsDark) {
   start();
   EXPECT_TRUE(daemon_->blank(true));

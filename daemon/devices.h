@@ -38,6 +38,9 @@ struct Devices {
   /// The part of the last seconds in which programs waited for memory, 0 to 1; where it is empty,
   /// what Linux says, and in virtual time nothing.
   std::function<Result<double>()> memory_pressure;
+  /// How long the machine has slept so far; where it is empty, what Linux says, and in virtual time
+  /// nothing.
+  std::function<Duration()> time_asleep;
 };
 
 /// What is empty is taken from the configuration: its tables [tracker], [output] and [control] as

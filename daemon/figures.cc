@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/figures.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 
@@ -20,6 +21,9 @@ constexpr std::array kColumns{&LatencyBudget::tracker,
                               &LatencyBudget::compensate,
                               &LatencyBudget::present,
                               &LatencyBudget::display};
+// Bits of one word.
+constexpr unsigned kDark = 1;
+constexpr unsigned kOut = 2;
 
 }  // namespace
 
@@ -49,12 +53,13 @@ void FigureBoard::post(const FrameFigures& figures) {
   put(figures.frame_ms);
   put(figures.gpu_ms);
   put(static_cast<std::uint64_t>(figures.late ? 1 : 0));
-  put(static_cast<std::uint64_t>(figures.dark ? 1 : 0));
+  put(static_cast<std::uint64_t>((figures.dark ? kDark : 0) | (figures.out ? kOut : 0)));
   put(figures.missed);
   for (double LatencyBudget::*column : kColumns) put(figures.latency_ms.*column);
   slot.stamp.store(2 * number + 2, std::memory_order_release);
   dropped_.store(figures.dropped, std::memory_order_relaxed);
   late_.store(figures.late_total, std::memory_order_relaxed);
+  if (figures.out) out_.fetch_add(1, std::memory_order_relaxed);
   posted_.store(number + 1, std::memory_order_release);
 }
 
@@ -76,7 +81,8 @@ std::vector<FrameFigures> FigureBoard::after(Time since) const {
     figures.frame_ms = std::bit_cast<double>(words[1]);
     figures.gpu_ms = std::bit_cast<double>(words[2]);
     figures.late = words[3] != 0;
-    figures.dark = words[4] != 0;
+    figures.dark = (words[4] & kDark) != 0;
+    figures.out = (words[4] & kOut) != 0;
     figures.missed = words[5];
     for (std::size_t i = 0; i < kColumns.size(); ++i)
       figures.latency_ms.*kColumns[i] = std::bit_cast<double>(words[6 + i]);
@@ -93,7 +99,7 @@ FigureBoard::Figures FigureBoard::last_second(Time now) const {
   figures.late = late_;
   const std::vector<FrameFigures> frames = after(now - kSecond);
   if (frames.empty()) return figures;
-  figures.frame_rate_hz = static_cast<double>(frames.size());
+  figures.frame_rate_hz = static_cast<double>(std::ranges::count(frames, true, &FrameFigures::out));
   std::vector<double> frame_ms;
   std::vector<double> gpu_ms;
   std::vector<LatencyBudget> budgets;
@@ -112,7 +118,7 @@ FigureBoard::Figures FigureBoard::last_second(Time now) const {
 
 std::optional<double> FigureBoard::late_part(Time now, Duration span) const {
   const std::vector<FrameFigures> frames = after(now - span);
-  if (frames.empty()) return std::nullopt;
+  if (frames.empty() || frames.size() == turns()) return std::nullopt;
   std::uint64_t late = 0;
   std::uint64_t missed = 0;
   for (const FrameFigures& frame : frames) {

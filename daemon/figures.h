@@ -16,11 +16,12 @@ namespace veneer::daemon {
 
 /// What one frame took.
 struct FrameFigures {
-  Time done;  ///< when it was handed over, on the daemon's clock
+  Time done;        ///< when it was handed over, on the daemon's clock
+  bool out = true;  ///< it went out: the display took it, or is dark as it was told
   double frame_ms = 0;
   double gpu_ms = std::numeric_limits<double>::quiet_NaN();  ///< NaN where nobody knows
   bool late = false;             ///< it took longer than a period, or missed its refresh
-  bool dark = false;             ///< nothing was shown: it counts, and tells nothing of times
+  bool dark = false;             ///< nothing was drawn, or shown: it tells nothing of times
   std::uint64_t missed = 0;      ///< refreshes that passed for want of this frame
   std::uint64_t dropped = 0;     ///< refreshes for which no frame was ready, since the start
   std::uint64_t late_total = 0;  ///< late frames, likewise
@@ -36,7 +37,7 @@ class FigureBoard {
   void post(const FrameFigures& figures);
 
   struct Figures {
-    std::uint64_t frames = 0;
+    std::uint64_t frames = 0;  ///< that went out
     std::uint64_t dropped = 0;
     std::uint64_t late = 0;
     double frame_rate_hz = 0;
@@ -49,13 +50,19 @@ class FigureBoard {
   [[nodiscard]] Figures last_second(Time now) const;
   /// The part of the refreshes within `span` before `now` that had a late frame or none; 0 to 1. A
   /// frame that was dark, or that the output refused, came in time: what kept it away has a name of
-  /// its own. Nothing where no frame was done in that time: one may be under way.
+  /// its own. Nothing where no frame was done in that time: one may be under way; nor before there
+  /// were frames for so long.
   [[nodiscard]] std::optional<double> late_part(Time now, Duration span) const;
   /// The rung of the quality on which the last frame was drawn, or which is faded to.
   void set_rung(std::size_t rung) { rung_.store(rung, std::memory_order_relaxed); }
   [[nodiscard]] std::size_t rung() const { return rung_.load(std::memory_order_relaxed); }
-  /// Since the start.
-  [[nodiscard]] std::uint64_t frames() const { return posted_; }
+  /// The machine slept for so long.
+  void note_sleep(Duration time) { slept_.fetch_add(time.count(), std::memory_order_relaxed); }
+  [[nodiscard]] Duration slept() const { return Duration{slept_}; }  ///< in all
+  /// That went out since the start.
+  [[nodiscard]] std::uint64_t frames() const { return out_; }
+  /// All since the start, those that the display refused included.
+  [[nodiscard]] std::uint64_t turns() const { return posted_; }
 
   static constexpr std::size_t kSlots = 4096;  ///< frames: three seconds at 1000 a second
 
@@ -71,9 +78,11 @@ class FigureBoard {
 
   std::unique_ptr<std::array<Slot, kSlots>> slots_;
   std::atomic<std::uint64_t> posted_{0};
+  std::atomic<std::uint64_t> out_{0};
   std::atomic<std::uint64_t> dropped_{0};
   std::atomic<std::uint64_t> late_{0};
   std::atomic<std::size_t> rung_{0};
+  std::atomic<Duration::rep> slept_{0};
 };
 
 /// The medians, each of its own column, so that their total is near that of a median frame.

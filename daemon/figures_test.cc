@@ -63,15 +63,17 @@ TEST(FigureBoard, DarkFramesCountButTellNoTimes) {
 
 TEST(FigureBoard, CountsLateFramesAndDroppedOnesAlike) {
   FigureBoard board;
+  board.post(frame_at(Time{1ms}, 1));
+  EXPECT_EQ(board.late_part(Time{2s}, 3s), std::nullopt) << "frames have only begun";
   for (int i = 0; i < 100; ++i) {
-    FrameFigures figures = frame_at(Time{i * 20ms + 1ms}, 1);
+    FrameFigures figures = frame_at(Time{10s + i * 20ms}, 1);
     figures.late = i % 4 == 0;
     figures.missed = i > 0 ? 1 : 0;  // one between any two
     board.post(figures);
   }
-  EXPECT_NEAR(board.late_part(Time{2s}, 3s).value(), (25 + 99) / 199.0, 1e-12);
+  EXPECT_NEAR(board.late_part(Time{12s}, 3s).value(), (25 + 99) / 199.0, 1e-12);
   // Nobody knows how the frame goes that takes longer than that.
-  EXPECT_EQ(board.late_part(Time{5s}, 3s), std::nullopt);
+  EXPECT_EQ(board.late_part(Time{15s}, 3s), std::nullopt);
 }
 
 TEST(FigureBoard, NoFrameIsLateThatTheDisplayRefused) {
@@ -85,11 +87,24 @@ TEST(FigureBoard, NoFrameIsLateThatTheDisplayRefused) {
     figures.dropped = dropped += refused ? 2 : 1;
     board.post(figures);
   };
-  for (int i = 1; i <= 50; ++i) post(i, false);
-  EXPECT_EQ(board.late_part(Time{1s}, 3s).value(), 1);
-  for (int i = 51; i <= 200; ++i) post(i, true);
-  EXPECT_EQ(board.late_part(Time{4s}, 3s).value(), 0);
-  EXPECT_EQ(board.last_second(Time{4s}).dropped, 350U);
+  for (int i = 1; i <= 200; ++i) post(i, false);
+  EXPECT_EQ(board.late_part(Time{4s}, 3s).value(), 1);
+  for (int i = 201; i <= 350; ++i) post(i, true);
+  EXPECT_EQ(board.late_part(Time{7s}, 3s).value(), 0);
+  EXPECT_EQ(board.last_second(Time{7s}).dropped, 500U);
+}
+
+TEST(FigureBoard, WhatTheDisplayRefusedDidNotGoOut) {
+  FigureBoard board;
+  for (int i = 1; i <= 100; ++i) {
+    FrameFigures figures = frame_at(Time{i * 10ms}, 1);
+    figures.out = i % 4 == 0;
+    figures.dark = !figures.out;
+    board.post(figures);
+  }
+  EXPECT_EQ(board.turns(), 100U);
+  EXPECT_EQ(board.frames(), 25U);
+  EXPECT_EQ(board.last_second(Time{1s}).frame_rate_hz, 25);
 }
 
 TEST(FigureBoard, AnotherThreadNeverSeesHalfAFrame) {

@@ -2,7 +2,6 @@
 #include "daemon/frame_loop.h"
 
 #include <fmt/ranges.h>
-#include <spdlog/spdlog.h>
 #include <time.h>
 
 #include <algorithm>
@@ -38,16 +37,6 @@ Duration computed() {
   timespec used{};
   ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
   return std::chrono::seconds(used.tv_sec) + std::chrono::nanoseconds(used.tv_nsec);
-}
-
-/// What CLOCK_BOOTTIME is ahead of CLOCK_MONOTONIC: the time that the machine has slept.
-Duration time_asleep() {
-  timespec boot{};
-  timespec running{};
-  ::clock_gettime(CLOCK_BOOTTIME, &boot);
-  ::clock_gettime(CLOCK_MONOTONIC, &running);
-  return std::chrono::seconds(boot.tv_sec - running.tv_sec) +
-         std::chrono::nanoseconds(boot.tv_nsec - running.tv_nsec);
 }
 
 }  // namespace
@@ -114,11 +103,11 @@ void FrameLoop::start_over() {
 
 // CLOCK_MONOTONIC stands still while the machine sleeps, so that poses from before look fresh.
 void FrameLoop::notice_sleep() {
-  if (!is_real_time()) return;
-  const Duration asleep = time_asleep();
+  if (!parts_.time_asleep) return;
+  const Duration asleep = parts_.time_asleep();
   const Duration slept = asleep - std::exchange(slept_before_, asleep);
   if (slept < kShortestSleep) return;
-  spdlog::info("the machine slept for {:.1f} s", to_seconds(slept));
+  parts_.board.note_sleep(slept);
   parts_.poses.slept(slept);
   start_over();
 }
@@ -409,6 +398,7 @@ void FrameLoop::account(const Slot& slot, Made made, FrameRecord& record) {
   figures.done = parts_.clock.now();
   figures.frame_ms = record.frame_ms;
   if (record.statistics.gpu_ms) figures.gpu_ms = *record.statistics.gpu_ms;
+  figures.out = made != Made::kDropped;
   figures.dark = made != Made::kShown;
   figures.dropped = run_.dropped;
   figures.late_total = run_.late;
@@ -417,7 +407,7 @@ void FrameLoop::account(const Slot& slot, Made made, FrameRecord& record) {
 }
 
 Result<RunRecord> FrameLoop::run(const std::atomic<bool>& stop, Progress& progress) {
-  slept_before_ = time_asleep();
+  if (parts_.time_asleep) slept_before_ = parts_.time_asleep();
   follow_output();
   VENEER_TRY(wait_for_first_pose(stop));
   const std::uint64_t frames = parts_.config.frames;

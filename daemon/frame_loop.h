@@ -84,6 +84,7 @@ class FrameLoop {
     FigureBoard& board;
     Wishes& wishes;
     std::function<void(std::uint64_t, Time)> before_frame;  ///< Devices::before_frame
+    std::function<Duration()> time_asleep;                  ///< Devices::time_asleep, or nothing
   };
   FrameLoop(Parts parts, std::unique_ptr<Show> show);
 

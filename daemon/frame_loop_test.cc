@@ -70,7 +70,7 @@ class FrameLoopTest : public ::testing::Test {
     script.profile.geometry.height = 3;
     script.profile.bits = 8;
     std::unique_ptr<Show> show = loader.begin(script).value();
-    FrameLoop loop({config_, clock, poses, keeper, loader, faults, board, wishes, {}},
+    FrameLoop loop({config_, clock, poses, keeper, loader, faults, board, wishes, {}, asleep_},
                    std::move(show));
     SilentProgress silent;
     Result<RunRecord> record = loop.run(stop_, silent);
@@ -82,6 +82,7 @@ class FrameLoopTest : public ::testing::Test {
   }
 
   Config config_;
+  std::function<Duration()> asleep_;
   std::vector<tracking::BodyId> bodies_{0};
   std::vector<service::Fault> faults_;  ///< at the end of the last run
   render::Scene scene_;
@@ -219,6 +220,22 @@ TEST_F(FrameLoopTest, ACoveredObjectIsAFaultAndTakesTheHighlightsLikeACoveredObs
     ASSERT_EQ(faults_.size(), 1U) << name;
     EXPECT_EQ(faults_[0].kind, service::FaultKind::kTracker);
     EXPECT_NE(faults_[0].text.find(name), std::string::npos) << faults_[0].text;
+  }
+}
+
+TEST_F(FrameLoopTest, APoseFromBeforeASuspendIsAsOldAsTheSuspend) {
+  static constexpr Time kSuspend{210ms};
+  asleep_ = [this]() -> Duration { return clock_.now() < kSuspend ? 5s : 5s + 1h; };
+  const RunRecord record = run(Time{1ms}, Time{200ms}).value();
+  for (const FrameRecord& frame : record.frames) {
+    // CLOCK_MONOTONIC alone would have it some milliseconds old.
+    const bool before = frame.display_time - 10ms < kSuspend;
+    if (before) {
+      EXPECT_LT(frame.pose_age_ms, 100);
+    } else {
+      EXPECT_GT(frame.pose_age_ms, 3.6e6);
+      EXPECT_GE(frame.presence, tracking::Presence::kHeld);
+    }
   }
 }
 

@@ -51,6 +51,10 @@ void Housekeeper::look() {
 }
 
 void Housekeeper::tell() {
+  if (const Duration slept = board_.slept() - slept_; slept > Duration::zero()) {
+    slept_ += slept;
+    spdlog::info("the machine slept for {:.1f} s", to_seconds(slept));
+  }
   for (const Faults::Change& change : faults_.take_changes()) {
     if (change.fault) {
       service::log_fault({change.fault->kind, change.fault->since, change.text}, change.begun);

@@ -29,7 +29,7 @@ class Housekeeper {
 
   /// Does what is due. One thread.
   void look();
-  /// Writes the log's lines of the faults that changed. Any thread.
+  /// Writes the log's lines of what changed: faults, and that the machine slept. One thread.
   void tell();
   /// A file could not be written; its folder is tried until it can. Any thread.
   void disk_failed(const std::filesystem::path& file, const Error& error);
@@ -48,6 +48,7 @@ class Housekeeper {
   std::function<Result<double>()> pressure_;
   Time late_due_;
   Time slow_due_;
+  Duration slept_{};  // of which it was told
   std::mutex disk_mutex_;
   std::map<std::filesystem::path, std::string> unwritten_;  // and why
 };

@@ -27,8 +27,11 @@ class ServiceControl {
  public:
   virtual ~ServiceControl() = default;
   [[nodiscard]] virtual ServiceStatus status() const = 0;
-  /// Frames handed over since the start; cheap. A watchdog asks this.
+  /// Frames that went out since the start, dark ones included; cheap.
   [[nodiscard]] virtual std::uint64_t frames() const = 0;
+  /// The same, and those that the display refused, which the state `fault` tells: what a watchdog
+  /// asks, since a new start brings no display back. Cheap.
+  [[nodiscard]] virtual std::uint64_t turns() const = 0;
 
   /// Errors of the following: kNotFound, kBadFormat, kInvalidOption (refused, the text says why),
   /// kTimeout (it was still busy), kUnavailable (stopping).

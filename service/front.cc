@@ -26,6 +26,7 @@ class AnnouncedControl final : public ServiceControl {
 
   [[nodiscard]] ServiceStatus status() const override { return control_.status(); }
   [[nodiscard]] std::uint64_t frames() const override { return control_.frames(); }
+  [[nodiscard]] std::uint64_t turns() const override { return control_.turns(); }
   [[nodiscard]] Status load_material(const std::filesystem::path& material) override {
     return control_.load_material(material);
   }

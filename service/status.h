@@ -101,7 +101,7 @@ struct ServiceStatus {
   std::string output;
   std::string renderer;
   std::string projector;        ///< what its control said last; empty without one
-  std::uint64_t frames = 0;     ///< handed over since the start
+  std::uint64_t frames = 0;     ///< that went out since the start, dark ones included
   std::uint64_t dropped = 0;    ///< refreshes for which no frame was ready
   std::uint64_t late = 0;       ///< frames that took longer than a period to make
   std::uint64_t recovered = 0;  ///< faults that were overcome

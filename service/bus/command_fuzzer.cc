@@ -23,6 +23,7 @@ class StrictControl final : public ServiceControl {
 
   [[nodiscard]] ServiceStatus status() const override { return {}; }
   [[nodiscard]] std::uint64_t frames() const override { return 0; }
+  [[nodiscard]] std::uint64_t turns() const override { return 0; }
   [[nodiscard]] Status load_material(const std::filesystem::path& path) override {
     return take_path(path);
   }

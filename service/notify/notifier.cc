@@ -48,7 +48,7 @@ Notifier::Notifier(const ServiceControl& control, const NotifyOptions& options)
       ping_period_(ping_period()),
       begun_(SteadyClock().now()),
       extended_until_(begun_),
-      looked_at_frames_(begun_) {
+      looked_at_turns_(begun_) {
   thread_ = std::thread([this] { run(); });
 }
 
@@ -96,7 +96,7 @@ void Notifier::look(Time now) {
   if (stopping_) return;
   look_at_start(now);
   look_at_status(now);
-  look_at_frames(now);
+  look_at_turns(now);
 }
 
 void Notifier::look_at_start(Time now) {
@@ -124,12 +124,12 @@ void Notifier::look_at_status(Time now) {
   said_ = std::move(line);
 }
 
-void Notifier::look_at_frames(Time now) {
-  if (!ping_period_ || now - looked_at_frames_ < *ping_period_) return;
-  looked_at_frames_ = now;
-  const std::uint64_t frames = control_.frames();
-  if (frames != frames_) say("WATCHDOG=1");
-  frames_ = frames;
+void Notifier::look_at_turns(Time now) {
+  if (!ping_period_ || now - looked_at_turns_ < *ping_period_) return;
+  looked_at_turns_ = now;
+  const std::uint64_t turns = control_.turns();
+  if (turns != turns_) say("WATCHDOG=1");
+  turns_ = turns;
 }
 
 void Notifier::say_stopping() {

@@ -26,8 +26,9 @@ struct NotifyOptions {
 };
 
 /// Tells systemd how the service is: READY=1 with the first frame, STATUS=, RELOADING=1 and READY=1
-/// around a reload, STOPPING=1, and WATCHDOG=1 as long as frames go out (sd_notify(3)). Says
-/// nothing where nobody listens: without NOTIFY_SOCKET start() gives nothing to hold.
+/// around a reload, STOPPING=1, and WATCHDOG=1 as long as frames go out, or a display refuses them
+/// (sd_notify(3)). Says nothing where nobody listens: without NOTIFY_SOCKET start() gives nothing
+/// to hold.
 class Notifier {
  public:
   /// @param control  borrowed; must outlive the notifier.
@@ -52,7 +53,7 @@ class Notifier {
   void look(Time now);
   void look_at_start(Time now);
   void look_at_status(Time now);
-  void look_at_frames(Time now);
+  void look_at_turns(Time now);
   void say_stopping();
 
   const ServiceControl& control_;
@@ -69,8 +70,8 @@ class Notifier {
   Time extended_until_;
   Time status_at_;
   std::string said_;
-  Time looked_at_frames_;
-  std::uint64_t frames_ = 0;
+  Time looked_at_turns_;
+  std::uint64_t turns_ = 0;
 
   std::thread thread_;
 };

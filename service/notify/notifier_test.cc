@@ -208,6 +208,25 @@ TEST_F(NotifierTest, PingsWhileFramesGoOutAndOnlyThen) {
   }
 }
 
+TEST_F(NotifierTest, ADisplayThatRefusesFramesIsNoStartAndNoReasonForAnother) {
+  constexpr Duration kPeriod = 800ms;
+  watch_every(kPeriod);
+  const auto notifier = Notifier::start(control_, options_);
+  std::atomic<bool> refusing{true};
+  std::thread frames([&] {
+    while (refusing) {
+      control_.refuse(1);
+      std::this_thread::sleep_for(5ms);
+    }
+  });
+  for (int i = 0; i < 3; ++i) EXPECT_FALSE(next_of({"WATCHDOG=1", "READY=1"}, kPeriod).empty());
+  EXPECT_EQ(next_of({"READY=1"}, kPeriod), "");
+  refusing = false;
+  frames.join();
+  control_.advance(1);
+  EXPECT_FALSE(next_of({"READY=1"}, kPeriod).empty());
+}
+
 TEST(StatusLine, IsOneLineWhateverTheFaultsSay) {
   ServiceStatus status = busy_status();
   status.faults.front().text = "two\nlines";

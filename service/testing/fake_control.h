@@ -23,6 +23,8 @@ class FakeControl final : public ServiceControl {
     change(status_);
   }
   void advance(std::uint64_t frames) { frames_ += frames; }
+  /// Frames that the display does not take.
+  void refuse(std::uint64_t frames) { refused_ += frames; }
   /// Every command from now on is refused with this; nothing: they are accepted.
   void refuse_with(std::optional<Error> error) {
     const std::scoped_lock lock(mutex_);
@@ -51,6 +53,7 @@ class FakeControl final : public ServiceControl {
     return status;
   }
   [[nodiscard]] std::uint64_t frames() const override { return frames_; }
+  [[nodiscard]] std::uint64_t turns() const override { return frames_ + refused_; }
   [[nodiscard]] Status load_material(const std::filesystem::path& material) override {
     return note("material " + material.string());
   }
@@ -97,6 +100,7 @@ class FakeControl final : public ServiceControl {
   std::optional<Error> refusal_;
   bool held_ = false;
   std::atomic<std::uint64_t> frames_{0};
+  std::atomic<std::uint64_t> refused_{0};
   mutable std::atomic<std::uint64_t> asked_{0};
 };
 

@@ -309,7 +309,12 @@ void Soak::look_for_recovery(Active& active, const ServiceStatus& status) {
   const bool dark_otherwise =
       busy(Group::kOutput) || busy(Group::kGpu) || switches_.is_on(Injection::kBlankStorm);
   const bool frames = dark_otherwise || display_.picture().frames > active.frames_at_end;
-  const bool over = !kind.fault || !lists(status, *kind.fault);
+  // Nor can the end of a fault while something else is there that brings it.
+  const bool brought_otherwise = std::ranges::any_of(active_, [&](const auto& other) {
+    return other && other->kind != nullptr && other->kind != &kind &&
+           other->kind->fault == kind.fault;
+  });
+  const bool over = !kind.fault || brought_otherwise || !lists(status, *kind.fault);
   Tally& tally = result_.tallies[static_cast<std::size_t>(kind.injection)];
   if (frames && over) {
     tally.listed += active.listed ? 1 : 0;
