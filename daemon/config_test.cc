@@ -24,6 +24,17 @@ TEST(Config, HasDefaultsForAllButItsInputs) {
   EXPECT_TRUE(config.render.compensate);
 }
 
+TEST(Config, ReadsWhenThePoseIsLatched) {
+  Config config;
+  ASSERT_TRUE(read("", &config));
+  EXPECT_EQ(config.latch, Latch::kLate);
+  ASSERT_TRUE(read("[pacing]\nlatch = \"early\"\n", &config));
+  EXPECT_EQ(config.latch, Latch::kEarly);
+  const Status refused = read("[pacing]\nlatch = \"soon\"\n");
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().what.find("\"late\" or \"early\""), std::string::npos);
+}
+
 TEST(Config, ReadsEveryKey) {
   Config config;
   ASSERT_TRUE(

@@ -75,6 +75,7 @@ Status FrameLoop::wait_for_first_pose(const std::atomic<bool>& stop) {
 // --- when
 
 void FrameLoop::follow_output() {
+  display_ms_.reset();
   projector::Output* output = parts_.output.get();
   parts_.loader.set_scanout(output == nullptr ? nullptr : output->scanout());
   const std::optional<Duration> refresh =
@@ -89,8 +90,13 @@ void FrameLoop::follow_output() {
   }
 }
 
+// From the first line going out to its light.
+Duration FrameLoop::display_latency() const {
+  return from_seconds(show_->script.config.display_latency_ms * 1e-3);
+}
+
 FrameLoop::Slot FrameLoop::next_slot(std::uint64_t number) {
-  const Duration latency = from_seconds(show_->script.config.display_latency_ms * 1e-3);
+  const Duration latency = display_latency();
   if (!pacer_) return {start_, start_ + latency, 0};
   const Pacer::Plan plan = pacer_->plan(number, parts_.clock.now());
   return {plan.wake, plan.refresh + latency, plan.skipped};
@@ -300,7 +306,8 @@ FrameLoop::Made FrameLoop::make_frame(const Slot& slot, FrameRecord& record) {
   budget.draw = std::max(0.0, computed_ms - record.statistics.software_ms.value_or(0));
   budget.gpu_draw = std::max(gpu_draw_ms, drawn_ms - budget.draw - budget.compensate);
   budget.present = record.frame_ms - drawn_ms;
-  budget.display = std::max(0.0, milliseconds(record.display_time - parts_.clock.now()));
+  record.handed_over = parts_.clock.now();
+  budget.display = std::max(0.0, milliseconds(record.display_time - record.handed_over));
   if (pacer_) pacer_->took(std::chrono::steady_clock::now() - begin);
   if (made == Made::kShown) {
     dark_ = false;
@@ -358,6 +365,28 @@ void FrameLoop::give_snapshot(bool dark) {
   snapshot->done.store(true, std::memory_order_release);
 }
 
+// What the display says of the frames that it has shown. Returns whether one came late.
+bool FrameLoop::note_presented() {
+  projector::Output* output = parts_.output.get();
+  const auto seen = output == nullptr ? std::nullopt : output->last_presented();
+  if (!seen) return false;
+  constexpr std::uint64_t kToldWithin = 8;  // frames
+  for (std::uint64_t back = 1; back <= std::min(seen_, kToldWithin); ++back) {
+    FrameRecord& record = run_.frames[(seen_ - back) % kRememberedFrames];
+    if (record.number != seen->number) continue;
+    const Duration error = seen->time + display_latency() - record.display_time;
+    // A display that is off by more is not believed.
+    if (record.presented || std::chrono::abs(error) > kStall) break;
+    record.presented = seen->time;
+    record.pose_age_ms += milliseconds(error);
+    record.latency_ms.display =
+        std::max(0.0, milliseconds(record.display_time + error - record.handed_over));
+    display_ms_ = record.latency_ms.display;
+    break;
+  }
+  return pacer_->shown(seen->number, seen->time);
+}
+
 void FrameLoop::account(const Slot& slot, Made made, FrameRecord& record) {
   ++run_.count;
   FrameFigures figures;
@@ -380,9 +409,7 @@ void FrameLoop::account(const Slot& slot, Made made, FrameRecord& record) {
     parts_.faults.first_frame();
   }
   if (pacer_) {
-    projector::Output* output = parts_.output.get();
-    const auto seen = output == nullptr ? std::nullopt : output->last_presented();
-    if (seen && pacer_->shown(seen->number, seen->time)) figures.late = true;
+    if (note_presented()) figures.late = true;
   } else {
     // The next frame starts on the next period that has not begun yet; those in between are lost.
     start_ += period_;
@@ -403,6 +430,8 @@ void FrameLoop::account(const Slot& slot, Made made, FrameRecord& record) {
   figures.dropped = run_.dropped;
   figures.late_total = run_.late;
   figures.latency_ms = record.latency_ms;
+  // Of this frame it is known a refresh or two later.
+  if (display_ms_) figures.latency_ms.display = *display_ms_;
   parts_.board.post(figures);
 }
 

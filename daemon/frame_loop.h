@@ -27,9 +27,11 @@ namespace veneer::daemon {
 /// What is remembered of one frame.
 struct FrameRecord {
   std::uint64_t number = 0;
-  Time display_time;
+  Time display_time;              ///< for which its poses were predicted
+  Time handed_over;               ///< to the output
+  std::optional<Time> presented;  ///< when its first line went out, where the display tells
   double frame_ms = 0;            ///< real time from the pose query to the frame handed over
-  double pose_age_ms = 0;         ///< from the newest sample to the moment of display
+  double pose_age_ms = 0;         ///< from the newest sample to the light, as is known
   tracking::BodyId observer = 0;  ///< whose picture it is
   tracking::Presence presence = tracking::Presence::kNone;  ///< his
   double specular_weight = 1;                               ///< FrameInput::specular_weight
@@ -121,6 +123,8 @@ class FrameLoop {
   void give_snapshot(bool dark);
   [[nodiscard]] static Made made_of(OutputKeeper::Outcome outcome);
   void account(const Slot& slot, Made made, FrameRecord& record);
+  bool note_presented();
+  [[nodiscard]] Duration display_latency() const;
   void drop_renderer();
   [[nodiscard]] double deadline_ms() const;
   [[nodiscard]] bool is_real_time() const { return parts_.config.clock == ClockKind::kMonotonic; }
@@ -132,7 +136,8 @@ class FrameLoop {
   // Where the output has refreshes of its own.
   std::optional<Pacer> pacer_;
   Duration period_;
-  Time start_;  // of the next frame, where it has none
+  Time start_;                        // of the next frame, where it has none
+  std::optional<double> display_ms_;  // from handing over to the light, of the last that was seen
   bool first_made_ = false;
   bool dark_ = false;  // and the output knows
   bool dark_failed_ = false;

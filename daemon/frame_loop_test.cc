@@ -7,6 +7,7 @@
 #include <optional>
 #include <thread>
 
+#include "base/statistics.h"
 #include "daemon/summary.h"
 #include "daemon/testing/fakes.h"
 #include "render/internal_testing.h"
@@ -267,6 +268,64 @@ TEST_F(FrameLoopTest, CountsTheFramesItLosesInRealTime) {
           .value();
   EXPECT_GE(record.dropped, 4U);
   EXPECT_GE(record.late, 1U);
+}
+
+class RefreshedFrameLoopTest : public FrameLoopTest {
+ protected:
+  static constexpr Duration kPeriod = 20ms;
+  RefreshedFrameLoopTest() {
+    config_.clock = ClockKind::kMonotonic;
+    config_.frame_rate_hz = 50;
+    config_.frames = 75;
+    config_.display_latency_ms = 4;
+  }
+  /// The frames of the second half: the phase is known by then.
+  std::vector<FrameRecord> settled(Latch latch) {
+    config_.latch = latch;
+    SteadyClock clock;
+    // Nothing in the loop could guess this phase.
+    const RunRecord record =
+        run(clock,
+            std::make_unique<MovingTracker>(clock, clock.now(), clock.now() + 1h),
+            std::make_unique<testing::RefreshingOutput>(clock, kPeriod, clock.now() + 313ms))
+            .value();
+    return {record.frames.end() - std::ssize(record.frames) / 2, record.frames.end()};
+  }
+  static double median_of(const std::vector<FrameRecord>& frames,
+                          const std::function<double(const FrameRecord&)>& value) {
+    std::vector<double> values;
+    for (const FrameRecord& frame : frames)
+      if (frame.presented) values.push_back(value(frame));
+    return quantile(values, 0.5);
+  }
+};
+
+TEST_F(RefreshedFrameLoopTest, PredictsForTheRefreshThatTheDisplayTellsOf) {
+  const std::vector<FrameRecord> frames = settled(Latch::kLate);
+  const auto told = std::ranges::count_if(
+      frames, [](const FrameRecord& frame) { return frame.presented.has_value(); });
+  EXPECT_GT(told, std::ssize(frames) / 2);
+  // From the light for which a frame was made to that by which it was seen. A display whose phase
+  // is not followed is off by any part of a period.
+  const double error_ms = median_of(frames, [](const FrameRecord& frame) {
+    return 1e3 * std::abs(to_seconds(*frame.presented + 4ms - frame.display_time));
+  });
+  EXPECT_LT(error_ms, 2);
+  // And the budget's last part is what was seen, not what was planned.
+  for (const FrameRecord& frame : frames) {
+    if (!frame.presented) continue;
+    EXPECT_NEAR(frame.latency_ms.display,
+                1e3 * to_seconds(*frame.presented + 4ms - frame.handed_over),
+                1e-6);
+  }
+}
+
+TEST_F(RefreshedFrameLoopTest, LateLatchingShowsYoungerPoses) {
+  const auto age = [](const FrameRecord& frame) { return frame.pose_age_ms; };
+  const double late_ms = median_of(settled(Latch::kLate), age);
+  const double early_ms = median_of(settled(Latch::kEarly), age);
+  // Drawing takes next to nothing here: early, a pose waits for nearly a whole period.
+  EXPECT_LT(late_ms, early_ms - 0.4 * to_seconds(kPeriod) * 1e3);
 }
 
 TEST_F(FrameLoopTest, TakesACheaperRungWhereFramesMissTheirDeadline) {

@@ -151,12 +151,12 @@ Status write_frame_log(const RunRecord& run, const std::filesystem::path& path) 
       "observer,"
       "presence,specular_weight,rung,fade,tracker_ms,hand_off_ms,wait_ms,draw_ms,gpu_draw_ms,"
       "compensate_ms,"
-      "present_ms,display_ms\n";
+      "present_ms,display_ms,presented_ns\n";
   for (const FrameRecord& frame : run.frames) {
     const std::optional<double>& gpu_ms = frame.statistics.gpu_ms;
     text += fmt::format(
         "{},{},{:.4f},{},{:.4f},{:.6f},{:.6f},{:.6f},{},{},{},{},{:.4f},{},{:.4f},"
-        "{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f}\n",
+        "{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{}\n",
         frame.number,
         frame.display_time.time_since_epoch().count(),
         frame.frame_ms,
@@ -179,7 +179,8 @@ Status write_frame_log(const RunRecord& run, const std::filesystem::path& path) 
         frame.latency_ms.gpu_draw,
         frame.latency_ms.compensate,
         frame.latency_ms.present,
-        frame.latency_ms.display);
+        frame.latency_ms.display,
+        frame.presented ? fmt::format("{}", frame.presented->time_since_epoch().count()) : "");
   }
   return write_text(path, text);
 }

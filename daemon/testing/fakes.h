@@ -10,6 +10,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "projector/output.h"
@@ -147,6 +148,35 @@ class FakeOutput final : public projector::Output {
 
  private:
   Stagehand& hand_;
+};
+
+/// A display that shows a frame with the first refresh after it was handed over, one a refresh, and
+/// says afterwards when that was.
+class RefreshingOutput final : public projector::Output {
+ public:
+  RefreshingOutput(Clock& clock, Duration period, Time phase)
+      : clock_(clock), period_(period), next_(phase) {}
+  std::string description() const override { return "refreshing"; }
+  bool wants_pixels(std::uint64_t) const override { return false; }
+  std::optional<Duration> refresh_period() const override { return period_; }
+  Status present(const projector::Frame& frame) override {
+    // One may wait for its refresh; another waits until that has gone.
+    clock_.sleep_until(next_);
+    while (next_ <= clock_.now()) next_ += period_;
+    shown_ = std::exchange(pending_, projector::Presented{frame.number, next_});
+    return {};
+  }
+  std::optional<projector::Presented> last_presented() override {
+    if (pending_ && pending_->time <= clock_.now()) return pending_;
+    return shown_;
+  }
+
+ private:
+  Clock& clock_;
+  Duration period_;
+  Time next_;
+  std::optional<projector::Presented> pending_;
+  std::optional<projector::Presented> shown_;
 };
 
 }  // namespace veneer::daemon::testing
