@@ -31,6 +31,8 @@ std::string manual_page(const CLI::App& app) {
       {"Environment",
        "*STATE_DIRECTORY: where snapshots, and the display's colour tables as they were found, are "
        "kept. systemd sets it.\n\n"
+       "*RUNTIME_DIRECTORY: where it is kept that the dark was asked for, so that it is dark again "
+       "after a crash. systemd sets it.\n\n"
        "*NOTIFY_SOCKET, WATCHDOG_USEC: how systemd is told that it is ready and that frames go "
        "out."},
       {"Files",
