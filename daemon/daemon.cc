@@ -36,8 +36,9 @@ std::function<Result<double>()> pressure_of(const Devices& devices, ClockKind ki
 
 class TheDaemon final : public Daemon {
  public:
-  TheDaemon(ConfigFile file, Config config, Devices devices)
+  TheDaemon(ConfigFile file, const TomlReader& started, Config config, Devices devices)
       : file_(std::move(file)),
+        started_(started),
         config_(std::move(config)),
         devices_(std::move(devices)),
         housekeeper_(clock(), config_.clock, faults_, board_, pressure_of(devices_, config_.clock)),
@@ -84,7 +85,7 @@ class TheDaemon final : public Daemon {
                 daemon.config_.validation),
           output(std::move(screen), daemon.devices_.open_output, clock, faults),
           loader(daemon.devices_, daemon.config_.clock, poses, clock, faults),
-          reloader(daemon.file_, loader, faults, clock) {}
+          reloader(daemon.file_, daemon.started_, loader, faults, clock) {}
     const render::RasterFormat raster;  // stays: who wants another one starts anew
     PoseFeed poses;
     OutputKeeper output;
@@ -102,6 +103,7 @@ class TheDaemon final : public Daemon {
   void remember_dark();
 
   const ConfigFile file_;
+  const TomlReader started_;
   const Config config_;
   const Devices devices_;
   VirtualClock virtual_;
@@ -381,7 +383,7 @@ Result<std::unique_ptr<Daemon>> Daemon::create(const std::filesystem::path& conf
   std::optional<TomlReader> reader;
   VENEER_ASSIGN(Config config, file.read(&reader));
   return std::make_unique<TheDaemon>(
-      file, std::move(config), completed(std::move(devices), *reader));
+      file, *reader, std::move(config), completed(std::move(devices), *reader));
 }
 
 }  // namespace veneer::daemon
