@@ -169,7 +169,8 @@ Result<Summary> TheDaemon::run(const std::atomic<bool>& stop, Progress& progress
   stage.loader.set_chore([this, &stage] {
     housekeeper_.look();
     stage.reloader.look();
-    if (stage.projector) stage.projector->look(stage.loader.profile_counts().reloads);
+    if (stage.projector)
+      stage.projector->look(stage.loader.current().config.profile, stage.loader.profile_changes());
   });
   const auto& material = *script->material;
   spdlog::info(

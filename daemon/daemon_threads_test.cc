@@ -2,14 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
-#include <functional>
-#include <future>
 #include <memory>
 #include <thread>
 #include <vector>
 
-#include "daemon/daemon.h"
-#include "daemon/testing/daemon_fixture.h"
+#include "daemon/testing/real_time_fixture.h"
 
 namespace veneer::daemon {
 namespace {
@@ -18,35 +15,9 @@ using namespace std::chrono_literals;
 using service::FaultKind;
 using service::State;
 
-/// Waits until `done`; false if that takes half a minute.
-bool wait_until(const std::function<bool()>& done) {
-  for (int i = 0; i < 6000 && !done(); ++i) std::this_thread::sleep_for(5ms);
-  return done();
-}
+using testing::wait_until;
 
-class RealTimeDaemonTest : public testing::DaemonFixture {
- protected:
-  void start() {
-    auto daemon = Daemon::create(at("veneer.toml"), {"frame_rate_hz=200"}, devices());
-    ASSERT_TRUE(daemon) << daemon.error().what;
-    daemon_ = *std::move(daemon);
-    ran_ = std::async(std::launch::async, [this] {
-      SilentProgress silent;
-      return daemon_->run(stop_, silent);
-    });
-    ASSERT_TRUE(wait_until([&] { return daemon_->frames() > 10; }));
-  }
-  void end() {
-    stop_ = true;
-    const Result<Summary> summary = ran_.get();
-    ASSERT_TRUE(summary) << summary.error().what;
-    EXPECT_EQ(hand_.alive, 0);
-  }
-
-  std::atomic<bool> stop_{false};
-  std::unique_ptr<Daemon> daemon_;
-  std::future<Result<Summary>> ran_;
-};
+class RealTimeDaemonTest : public testing::RealTimeFixture {};
 
 TEST_F(RealTimeDaemonTest, CallsOfManyThreadsAreServedOneAfterAnother) {
   start();
