@@ -75,5 +75,51 @@ TEST_F(ProjectorAlarmTest, EndsWithAReloadThatNamesAnotherProfile) {
   end();
 }
 
+TEST_F(ProjectorAlarmTest, IsAskedAsOftenAsTheConfigurationSays) {
+  write_config("[control]\npoll_s = 1\n");
+  start_with(with_control());
+  EXPECT_TRUE(wait_until([this] { return machine_.opened >= 3; })) << "by default in a minute";
+  EXPECT_NE(daemon_->status().projector.find("a machine: on, input digital1"), std::string::npos)
+      << daemon_->status().projector;
+  end();
+}
+
+TEST_F(ProjectorAlarmTest, SilenceIsAFaultAndThePictureGoesOn) {
+  machine_.there = false;
+  start_with(with_control());
+  EXPECT_TRUE(wait_until([this] { return has(FaultKind::kProjector); }));
+  EXPECT_NE(daemon_->status().projector.find("nobody answers"), std::string::npos);
+  const std::uint64_t presented = hand_.presented;
+  EXPECT_TRUE(wait_until([&] { return hand_.presented > presented + 10; }));
+  end();
+}
+
+TEST_F(ProjectorAlarmTest, ItIsOpenedAsTheTableSays) {
+  // Nobody listens there.
+  write_config("[control]\ndriver = \"pjlink\"\nhost = \"127.0.0.1\"\nport = 1\n");
+  start();
+  EXPECT_TRUE(wait_until([this] { return has(FaultKind::kProjector); }));
+  EXPECT_NE(daemon_->status().projector.find("127.0.0.1"), std::string::npos)
+      << daemon_->status().projector;
+  end();
+}
+
+TEST_F(ProjectorAlarmTest, NobodyIsAskedWhereThereIsNoTable) {
+  start();
+  EXPECT_EQ(daemon_->status().projector, "");
+  EXPECT_FALSE(has(FaultKind::kProjector));
+  end();
+}
+
+TEST_F(ProjectorAlarmTest, NobodyIsAskedInVirtualTime) {
+  auto daemon =
+      Daemon::create(at("veneer.toml"), {"clock=\"virtual\"", "frames=200"}, with_control())
+          .value();
+  SilentProgress silent;
+  EXPECT_TRUE(daemon->run(stop_, silent));
+  EXPECT_EQ(machine_.opened, 0);
+  EXPECT_EQ(daemon->status().projector, "");
+}
+
 }  // namespace
 }  // namespace veneer::daemon
