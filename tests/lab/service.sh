@@ -147,6 +147,13 @@ expect_within "$patience" "on the display" screen_is_lit
 expect "it is blanked once more" call Blank b true
 expect "that is remembered" test -e /run/veneer/dark
 
+# --- another version beneath it
+
+running=$(unit MainPID)
+expect "a package over the old one says what is left to do" says 'systemctl restart veneerd' dpkg --install --force-depends --force-unsafe-io --no-triggers --force-confold "$package"
+expect "and leaves what runs alone" test "$(unit MainPID)" = "$running"
+expect "dark as it is" says '"blank"' get State
+
 # --- stopped
 
 expect "it stops in time" timeout 30 systemctl stop veneerd
