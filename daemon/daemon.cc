@@ -46,8 +46,8 @@ class TheDaemon final : public Daemon {
     if (!dark_flag_.is_up()) return;
     // Before the first frame: nobody is to see a single one.
     spdlog::warn(
-        "dark from the start: that was asked for before the last end, which was none in "
-        "good order, and was not taken back; `veneer tell unblank` does");
+        "dark from the start: that was asked for before a crash and never taken back; `veneer tell "
+        "unblank` does");
     wishes_.dark = true;
     faults_.ask_for_dark(true);
   }
@@ -112,6 +112,7 @@ class TheDaemon final : public Daemon {
   FigureBoard board_;
   Wishes wishes_;
   Housekeeper housekeeper_;
+  std::atomic<bool> ended_well_{false};
   std::mutex dark_mutex_;
   DarkFlag dark_flag_;
   std::optional<tracking::PoseRecorder> recorder_;
@@ -197,6 +198,7 @@ Result<Summary> TheDaemon::run(const std::atomic<bool>& stop, Progress& progress
   housekeeper_.tell();
   // After an error systemd starts another one, which is to be as dark as this one.
   if (!record) return tl::unexpected<Error>(record.error());
+  ended_well_ = true;
   remember_dark();
 
   Summary summary = summary_of(*record, tracker_start);
@@ -339,7 +341,7 @@ Status TheDaemon::blank(bool on) {
 // Whoever comes last writes what holds then; a stop in good order ends the wish.
 void TheDaemon::remember_dark() {
   const std::scoped_lock lock(dark_mutex_);
-  const bool dark = wishes_.dark && faults_.state() != service::State::kStopping;
+  const bool dark = wishes_.dark && !ended_well_;
   if (const Status put = dark_flag_.put(dark); !put)
     spdlog::warn(
         "{}; after a crash the projector may be {}", put.error().what, dark ? "lit" : "dark");
