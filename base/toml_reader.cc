@@ -131,6 +131,48 @@ TomlReader TomlReader::again() const {
   return TomlReader(std::move(document), std::move(node));
 }
 
+namespace {
+
+bool same(const toml::node& a, const toml::node& b) {
+  return a.type() == b.type() &&
+         a.visit([&b](const auto& value) { return value == static_cast<decltype(value)>(b); });
+}
+
+/// Below `path`; a table that one of both lacks counts as empty.
+void find_differences(const toml::table& a,
+                      const toml::table& b,
+                      const std::string& path,
+                      std::vector<std::string>& differences) {
+  const toml::table empty;
+  std::set<std::string> keys;
+  for (const toml::table* table : {&a, &b}) {
+    for (const auto& [key, value] : *table) keys.emplace(key.str());
+  }
+  for (const std::string& key : keys) {
+    const toml::node* left = a.get(key);
+    const toml::node* right = b.get(key);
+    const auto is_table = [](const toml::node* node) {
+      return node == nullptr || node->is_table();
+    };
+    if (is_table(left) && is_table(right)) {
+      find_differences(left == nullptr ? empty : *left->as_table(),
+                       right == nullptr ? empty : *right->as_table(),
+                       path + key + '.',
+                       differences);
+    } else if (left == nullptr || right == nullptr || !same(*left, *right)) {
+      differences.push_back(path + key);
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> TomlReader::differences(const TomlReader& other) const {
+  std::vector<std::string> result;
+  find_differences(*document_->root, *other.document_->root, "", result);
+  return result;
+}
+
 bool TomlReader::contains(std::string_view key) const {
   return node_->table != nullptr && node_->table->contains(key);
 }

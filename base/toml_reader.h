@@ -38,6 +38,10 @@ class TomlReader {
   /// is opened again while somebody edits the file.
   [[nodiscard]] TomlReader again() const;
 
+  /// The keys whose values are not those of `other`, one that only one of both has included, as
+  /// "tracker.driver", sorted. Values are compared as they are written; whole arrays at once.
+  [[nodiscard]] std::vector<std::string> differences(const TomlReader& other) const;
+
   void read(std::string_view key, double& value);
   void read(std::string_view key, int& value);
   void read(std::string_view key, std::uint64_t& value);

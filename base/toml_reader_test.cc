@@ -221,5 +221,38 @@ TEST(TomlReader, AgainForgetsWhatWasAskedAndWhatWasWrong) {
   EXPECT_NE(status.error().what.find("x.toml:1"), std::string::npos) << status.error().what;
 }
 
+TEST(TomlReader, TellsWhichKeysDiffer) {
+  const std::string text =
+      "a = 1\nb = \"x\"\nlist = [1, 2]\n[one]\nc = 2.5\nd = true\n[one.deep]\ne = 1\n[[path]]\n"
+      "f = 1\n[[path]]\nf = 2\n";
+  const auto differences = [&text](const std::string& other) {
+    const TomlReader a = TomlReader::parse(text, "a").value();
+    const TomlReader b = TomlReader::parse(other, "b").value();
+    EXPECT_EQ(a.differences(b), b.differences(a)) << "whichever comes first";
+    return a.differences(b);
+  };
+  const auto with = [&text](const std::string& from, const std::string& to) {
+    std::string other = text;
+    return other.replace(other.find(from), from.size(), to);
+  };
+  using Keys = std::vector<std::string>;
+  EXPECT_EQ(differences(text), Keys());
+  EXPECT_EQ(
+      differences("# said otherwise\none = {d = true, deep = {e = 1}, c = 2.5}\nlist = [ 1,2 ]\n"
+                  "b = \"x\"\na = 1\npath = [{f = 1}, {f = 2}]\n"),
+      Keys());
+  EXPECT_EQ(differences(with("a = 1", "a = 2")), Keys{"a"});
+  EXPECT_EQ(differences(with("a = 1", "a = 1.0")), Keys{"a"});
+  EXPECT_EQ(differences(with("a = 1\n", "")), Keys{"a"});
+  EXPECT_EQ(differences(with("\"x\"", "\"y\"")), Keys{"b"});
+  EXPECT_EQ(differences(with("[1, 2]", "[2, 1]")), Keys{"list"});
+  EXPECT_EQ(differences(with("d = true", "d = false")), Keys{"one.d"});
+  EXPECT_EQ(differences(with("e = 1", "e = 2\nnew = 0")), (Keys{"one.deep.e", "one.deep.new"}));
+  EXPECT_EQ(differences(with("f = 2", "f = 3")), Keys{"path"});
+  EXPECT_EQ(differences(with("[[path]]\nf = 2\n", "")), Keys{"path"});
+  EXPECT_EQ(differences("a = {x = 1}\n"),
+            (Keys{"a", "b", "list", "one.c", "one.d", "one.deep.e", "path"}));
+}
+
 }  // namespace
 }  // namespace veneer

@@ -24,8 +24,8 @@ void read_path(TomlReader& toml, std::string_view key, std::filesystem::path& pa
 }
 
 // systemd gives several, divided by colons, where a unit asks for several; the first is ours.
-std::filesystem::path state_directory_of_the_unit() {
-  const char* given = std::getenv("STATE_DIRECTORY");
+std::filesystem::path directory_of_the_unit(const char* variable) {
+  const char* given = std::getenv(variable);
   if (given == nullptr) return {};
   const std::string all = given;
   return all.substr(0, all.find(':'));
@@ -69,7 +69,9 @@ Result<Config> Config::read(TomlReader& toml) {
   read_path(toml, "frame_log", config.frame_log, false);
   read_path(toml, "record", config.record, false);
   read_path(toml, "state_directory", config.state_directory, false);
-  if (config.state_directory.empty()) config.state_directory = state_directory_of_the_unit();
+  if (config.state_directory.empty())
+    config.state_directory = directory_of_the_unit("STATE_DIRECTORY");
+  config.runtime_directory = directory_of_the_unit("RUNTIME_DIRECTORY");
 
   std::string clock = "monotonic";
   toml.read("clock", clock);

@@ -57,6 +57,9 @@ struct Config {
   /// Where snapshots and what must outlive the process go; by default the environment's
   /// STATE_DIRECTORY, which systemd sets. None where empty.
   std::filesystem::path state_directory;
+  /// Where what must outlive a crash goes, but not a stop: the environment's RUNTIME_DIRECTORY,
+  /// which systemd sets; no key. None where empty.
+  std::filesystem::path runtime_directory;
   Latch latch = Latch::kLate;
   projector::ControlWatchOptions control;  ///< of the table [control], without its driver's keys
   service::FrontOptions service;

@@ -70,6 +70,26 @@ TEST(Config, ReadsWhatGivesWay) {
   EXPECT_EQ(config.quality.deadline_ms, 12.5);
 }
 
+TEST(Config, ReadsWhoIsToSpeakWithIt) {
+  Config config;
+  ASSERT_TRUE(read("", &config));
+  EXPECT_EQ(config.service.bus, "none") << "nobody, where nobody says so";
+  EXPECT_EQ(config.service.metrics_port, 0);
+  EXPECT_TRUE(config.service.metrics_file.empty());
+  EXPECT_EQ(config.service.reload_requested, nullptr);
+  ASSERT_TRUE(
+      read("[service]\nbus = \"unix:path=/run/bus\"\nmetrics_port = 9709\nmetrics_file = "
+           "\"/var/lib/a.prom\"\n",
+           &config));
+  EXPECT_EQ(config.service.bus, "unix:path=/run/bus");
+  EXPECT_EQ(config.service.metrics_port, 9709);
+  EXPECT_EQ(config.service.metrics_file, "/var/lib/a.prom");
+  ASSERT_TRUE(read("[service]\nmetrics_port = 65535\nmetrics_file = \"sub/a.prom\"\n", &config));
+  EXPECT_EQ(config.service.metrics_port, 65535);
+  EXPECT_EQ(config.service.metrics_file, std::filesystem::absolute("sub/a.prom"))
+      << "it refers to the folder of the file";
+}
+
 TEST(Config, RefusesWhatMakesNoSense) {
   for (const char* line : {"frame_rate_hz = 0",
                            "frame_rate_hz = -3",
@@ -88,6 +108,12 @@ TEST(Config, RefusesWhatMakesNoSense) {
                            "[render]\nscale = nan",
                            "[render]\nscale = 1.5",
                            "[render]\nevaluation = \"cpu\"",
+                           "[service]\nbus = \"sytem\"",
+                           "[service]\nbus = 1",
+                           "[service]\nmetrics_port = -1",
+                           "[service]\nmetrics_port = 65536",
+                           "[service]\nmetrics_file = \"/a.txt\"",
+                           "[service]\nmetrics = 1",
                            "[prediction]\nhorizon_s = -1"}) {
     const Status status = read(line);
     ASSERT_FALSE(status) << line;

@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "daemon/dark_flag.h"
 #include "daemon/faults.h"
 #include "daemon/figures.h"
 #include "daemon/first_start.h"
@@ -41,12 +42,21 @@ std::function<Duration()> sleep_of(const Devices& devices, ClockKind kind) {
 
 class TheDaemon final : public Daemon {
  public:
-  TheDaemon(ConfigFile file, Config config, Devices devices)
+  TheDaemon(ConfigFile file, const TomlReader& started, Config config, Devices devices)
       : file_(std::move(file)),
+        started_(started),
         config_(std::move(config)),
         devices_(std::move(devices)),
-        housekeeper_(
-            clock(), config_.clock, faults_, board_, pressure_of(devices_, config_.clock)) {}
+        housekeeper_(clock(), config_.clock, faults_, board_, pressure_of(devices_, config_.clock)),
+        dark_flag_(is_virtual() ? std::filesystem::path() : config_.runtime_directory) {
+    if (!dark_flag_.is_up()) return;
+    // Before the first frame: nobody is to see a single one.
+    spdlog::warn(
+        "dark from the start: that was asked for before a crash and never taken back; `veneer tell "
+        "unblank` does");
+    wishes_.dark = true;
+    faults_.ask_for_dark(true);
+  }
 
   [[nodiscard]] Result<Summary> run(const std::atomic<bool>& stop, Progress& progress) override;
   [[nodiscard]] service::ServiceStatus status() const override;
@@ -82,7 +92,7 @@ class TheDaemon final : public Daemon {
                 daemon.config_.validation),
           output(std::move(screen), daemon.devices_.open_output, clock, faults),
           loader(daemon.devices_, daemon.config_.clock, poses, clock, faults),
-          reloader(daemon.file_, loader, faults, clock) {}
+          reloader(daemon.file_, daemon.started_, loader, faults, clock) {}
     const render::RasterFormat raster;  // stays: who wants another one starts anew
     PoseFeed poses;
     OutputKeeper output;
@@ -97,8 +107,10 @@ class TheDaemon final : public Daemon {
   [[nodiscard]] Status change(FaultKind about, std::function<Status(Script&)> edit);
   [[nodiscard]] Time now() const { return is_virtual() ? virtual_.now() : steady_.now(); }
   [[nodiscard]] Summary summary_of(const RunRecord& record, Time tracker_start) const;
+  void remember_dark();
 
   const ConfigFile file_;
+  const TomlReader started_;
   const Config config_;
   const Devices devices_;
   VirtualClock virtual_;
@@ -107,6 +119,9 @@ class TheDaemon final : public Daemon {
   FigureBoard board_;
   Wishes wishes_;
   Housekeeper housekeeper_;
+  std::atomic<bool> ended_well_{false};
+  std::mutex dark_mutex_;
+  DarkFlag dark_flag_;
   std::optional<tracking::PoseRecorder> recorder_;
   std::timed_mutex snapshot_turn_;
   // Left when the run is over, so that who has seen it may use it.
@@ -162,7 +177,8 @@ Result<Summary> TheDaemon::run(const std::atomic<bool>& stop, Progress& progress
   stage.loader.set_chore([this, &stage] {
     housekeeper_.look();
     stage.reloader.look();
-    if (stage.projector) stage.projector->look(stage.loader.profile_counts().reloads);
+    if (stage.projector)
+      stage.projector->look(stage.loader.current().config.profile, stage.loader.profile_changes());
   });
   const auto& material = *script->material;
   spdlog::info(
@@ -188,7 +204,10 @@ Result<Summary> TheDaemon::run(const std::atomic<bool>& stop, Progress& progress
   faults_.stopping();
   stage.loader.stop(loop.take_show());
   housekeeper_.tell();
+  // After an error systemd starts another one, which is to be as dark as this one.
   if (!record) return tl::unexpected<Error>(record.error());
+  ended_well_ = true;
+  remember_dark();
 
   Summary summary = summary_of(*record, tracker_start);
   if (!config_.summary.empty()) VENEER_TRY(write_summary(summary, config_.summary));
@@ -317,6 +336,7 @@ Status TheDaemon::blank(bool on) {
   if (faults_.state() == service::State::kStopping) return stage().map([](Stage*) {});
   wishes_.dark = on;
   faults_.ask_for_dark(on);
+  remember_dark();
   const Stage* stage = published_;
   // The frame loop cannot wait for itself, and a start or a lost output need not be waited for.
   if (stage == nullptr || stage->loader.show_here() != nullptr) return {};
@@ -324,6 +344,15 @@ Status TheDaemon::blank(bool on) {
   for (int i = 0; i < kTries && wishes_.is_dark != on; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   return {};
+}
+
+// Whoever comes last writes what holds then; a stop in good order ends the wish.
+void TheDaemon::remember_dark() {
+  const std::scoped_lock lock(dark_mutex_);
+  const bool dark = wishes_.dark && !ended_well_;
+  if (const Status put = dark_flag_.put(dark); !put)
+    spdlog::warn(
+        "{}; after a crash the projector may be {}", put.error().what, dark ? "lit" : "dark");
 }
 
 Result<std::filesystem::path> TheDaemon::snapshot() {
@@ -365,7 +394,7 @@ Result<std::unique_ptr<Daemon>> Daemon::create(const std::filesystem::path& conf
   std::optional<TomlReader> reader;
   VENEER_ASSIGN(Config config, file.read(&reader));
   return std::make_unique<TheDaemon>(
-      file, std::move(config), completed(std::move(devices), *reader));
+      file, *reader, std::move(config), completed(std::move(devices), *reader));
 }
 
 }  // namespace veneer::daemon

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <functional>
-#include <future>
+#include <cstdlib>
 #include <memory>
 #include <thread>
 #include <vector>
 
-#include "daemon/daemon.h"
-#include "daemon/testing/daemon_fixture.h"
+#include "daemon/testing/real_time_fixture.h"
 
 namespace veneer::daemon {
 namespace {
@@ -17,35 +15,9 @@ using namespace std::chrono_literals;
 using service::FaultKind;
 using service::State;
 
-/// Waits until `done`; false if that takes half a minute.
-bool wait_until(const std::function<bool()>& done) {
-  for (int i = 0; i < 6000 && !done(); ++i) std::this_thread::sleep_for(5ms);
-  return done();
-}
+using testing::wait_until;
 
-class RealTimeDaemonTest : public testing::DaemonFixture {
- protected:
-  void start() {
-    auto daemon = Daemon::create(at("veneer.toml"), {"frame_rate_hz=200"}, devices());
-    ASSERT_TRUE(daemon) << daemon.error().what;
-    daemon_ = *std::move(daemon);
-    ran_ = std::async(std::launch::async, [this] {
-      SilentProgress silent;
-      return daemon_->run(stop_, silent);
-    });
-    ASSERT_TRUE(wait_until([&] { return daemon_->frames() > 10; }));
-  }
-  void end() {
-    stop_ = true;
-    const Result<Summary> summary = ran_.get();
-    ASSERT_TRUE(summary) << summary.error().what;
-    EXPECT_EQ(hand_.alive, 0);
-  }
-
-  std::atomic<bool> stop_{false};
-  std::unique_ptr<Daemon> daemon_;
-  std::future<Result<Summary>> ran_;
-};
+class RealTimeDaemonTest : public testing::RealTimeFixture {};
 
 TEST_F(RealTimeDaemonTest, CallsOfManyThreadsAreServedOneAfterAnother) {
   start();
@@ -128,6 +100,66 @@ TEST_F(RealTimeDaemonTest, BlankReturnsWhenItIsDark) {
   EXPECT_TRUE(hand_.dark);
   const std::uint64_t frames = daemon_->frames();
   EXPECT_TRUE(wait_until([&] { return daemon_->frames() > frames + 10; }));
+  EXPECT_TRUE(daemon_->blank(false));
+  EXPECT_FALSE(hand_.dark);
+  end();
+}
+
+/// With a runtime directory, as systemd gives one.
+class DarkDaemonTest : public RealTimeDaemonTest {
+ protected:
+  void SetUp() override {
+    RealTimeDaemonTest::SetUp();
+    ::setenv("RUNTIME_DIRECTORY", runtime_.path().c_str(), 1);
+  }
+  void TearDown() override { ::unsetenv("RUNTIME_DIRECTORY"); }
+  [[nodiscard]] bool remembered() const {
+    return std::filesystem::exists(runtime_.path() / "dark");
+  }
+  /// One that was told to be dark and then died, not in good order.
+  void die_in_the_dark() {
+    const auto dead = Daemon::create(at("veneer.toml"), {}, devices()).value();
+    EXPECT_TRUE(dead->blank(true));
+    EXPECT_TRUE(remembered());
+  }
+
+  TemporaryFolder runtime_;
+};
+
+TEST_F(DarkDaemonTest, DarknessOutlivesADeathUntilItIsTakenBack) {
+  die_in_the_dark();
+  start();
+  EXPECT_EQ(daemon_->status().state, State::kBlank);
+  EXPECT_EQ(hand_.presented, 0U) << "not one frame";
+  EXPECT_TRUE(hand_.dark);
+  EXPECT_TRUE(daemon_->blank(false));
+  EXPECT_FALSE(remembered());
+  EXPECT_TRUE(wait_until([&] { return hand_.presented > 10; }));
+  end();
+}
+
+TEST_F(DarkDaemonTest, DarknessEndsWithAStopInGoodOrder) {
+  start();
+  EXPECT_TRUE(daemon_->blank(true));
+  EXPECT_TRUE(remembered());
+  end();
+  EXPECT_FALSE(remembered());
+}
+
+TEST_F(DarkDaemonTest, DarknessOutlivesAStartThatFails) {
+  die_in_the_dark();
+  hand_.output_refuses = true;
+  auto daemon = Daemon::create(at("veneer.toml"), {}, devices()).value();
+  SilentProgress silent;
+  EXPECT_FALSE(daemon->run(stop_, silent));
+  EXPECT_TRUE(remembered()) << "systemd starts another one";
+}
+
+TEST_F(DarkDaemonTest, ItIsDarkEvenWhereThatCannotBeRemembered) {
+  ::setenv("RUNTIME_DIRECTORY", (runtime_.path() / "gone").c_str(), 1);
+  start();
+  EXPECT_TRUE(daemon_->blank(true));
+  EXPECT_TRUE(hand_.dark);
   EXPECT_TRUE(daemon_->blank(false));
   EXPECT_FALSE(hand_.dark);
   end();

@@ -21,8 +21,10 @@ std::string manual_page(const CLI::App& app) {
        "installed, but neither enabled nor started, since it needs a scene, a material and a "
        "profile first."},
       {"Signals",
-       "*SIGHUP: read the configuration and all that it names anew. What is bad is refused, and "
-       "what was shown stays.\n\n"
+       "*SIGHUP: read the configuration anew, and the scene, material and profile that it names. "
+       "What is bad is refused, and what was shown stays. Keys that veneer.toml(5) marks are taken "
+       "at "
+       "the next start; a warning names those that differ.\n\n"
        "*SIGTERM, SIGINT: give the display back and end."},
       {"Exit status",
        "*0: told to stop, or all frames made that the configuration asks for\n\n"
@@ -31,6 +33,8 @@ std::string manual_page(const CLI::App& app) {
       {"Environment",
        "*STATE_DIRECTORY: where snapshots, and the display's colour tables as they were found, are "
        "kept. systemd sets it.\n\n"
+       "*RUNTIME_DIRECTORY: where it is kept that the dark was asked for, so that it is dark again "
+       "after a crash. systemd sets it.\n\n"
        "*NOTIFY_SOCKET, WATCHDOG_USEC: how systemd is told that it is ready and that frames go "
        "out."},
       {"Files",

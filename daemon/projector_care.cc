@@ -3,7 +3,6 @@
 
 #include <fmt/ranges.h>
 
-#include <utility>
 #include <vector>
 
 #include "calibration/profile_store.h"
@@ -23,8 +22,11 @@ ProjectorCare::ProjectorCare(projector::ControlWatch::Open open,
       clock_(clock),
       watch_(std::move(open), std::move(kept), options) {}
 
-void ProjectorCare::look(std::uint64_t profiles) {
-  if (std::exchange(profiles_, profiles) != profiles) {
+void ProjectorCare::look(const std::filesystem::path& profile, std::uint64_t changes) {
+  const bool another = profile != profile_ || changes != changes_;
+  profile_ = profile;
+  changes_ = changes;
+  if (another) {
     // One that cannot be read any more was reported by who drew with it.
     if (const auto loaded = calibration::ProfileStore(profile_).load_newest_good())
       watch_.keep(loaded->profile.record);

@@ -15,7 +15,7 @@ namespace veneer::daemon {
 /// says of itself what spoils colours.
 class ProjectorCare {
  public:
-  /// @param profile  the folder whose record it is compared with.
+  /// @param profile  the folder that `kept` is of.
   /// Borrows the faults and the clock.
   ProjectorCare(projector::ControlWatch::Open open,
                 projector::ControlRecord kept,
@@ -25,17 +25,18 @@ class ProjectorCare {
                 Clock& clock);
 
   /// Does what is due. One thread, which may wait for the disk.
-  /// @param profiles  how many profiles were exchanged so far; with another one the record is read
-  ///                  again.
-  void look(std::uint64_t profiles);
+  /// @param profile  the folder of the profile that is drawn with.
+  /// @param changes  ShowLoader::profile_changes(). With another folder or number the record that
+  ///                 the projector is compared with is read again.
+  void look(const std::filesystem::path& profile, std::uint64_t changes);
   /// A line on the projector. Any thread.
   [[nodiscard]] std::string text() const { return watch_.report().text; }
 
  private:
-  const std::filesystem::path profile_;
+  std::filesystem::path profile_;
+  std::uint64_t changes_ = 0;
   Faults& faults_;
   Clock& clock_;
-  std::uint64_t profiles_ = 0;
   projector::ControlWatch watch_;
 };
 

@@ -3,14 +3,14 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <functional>
 #include <memory>
-#include <mutex>
+#include <string>
 #include <thread>
 
 #include "base/testing/temporary_folder.h"
 #include "calibration/profile_store.h"
+#include "daemon/testing/fake_projector.h"
 #include "render/internal_testing.h"
 
 namespace veneer::daemon {
@@ -19,33 +19,8 @@ namespace {
 using namespace std::chrono_literals;
 using service::FaultKind;
 
-/// A projector that says what it is told to say.
-struct Machine {
-  std::mutex mutex;
-  projector::ProjectorState state;
-  std::atomic<bool> there{true};
-  void set(const std::function<void(projector::ProjectorState&)>& edit) {
-    const std::scoped_lock lock(mutex);
-    edit(state);
-  }
-};
-
-class Control final : public projector::ProjectorControl {
- public:
-  explicit Control(Machine& machine) : machine_(machine) {}
-  std::string description() const override { return "a machine"; }
-  Result<projector::ProjectorState> read_state() override {
-    const std::scoped_lock lock(machine_.mutex);
-    return machine_.state;
-  }
-  Status power(bool) override { return {}; }
-  Status mute(bool) override { return {}; }
-  Status freeze(bool) override { return {}; }
-  Status select_input(const std::string&) override { return {}; }
-
- private:
-  Machine& machine_;
-};
+using testing::FakeControl;
+using testing::Machine;
 
 class ProjectorCareTest : public ::testing::Test {
  protected:
@@ -59,7 +34,7 @@ class ProjectorCareTest : public ::testing::Test {
     return std::make_unique<ProjectorCare>(
         [this]() -> Result<std::unique_ptr<projector::ProjectorControl>> {
           if (!machine_.there) return fail(Errc::kNotFound, "nobody answers");
-          return std::make_unique<Control>(machine_);
+          return std::make_unique<FakeControl>(machine_);
         },
         kept,
         folder_.path() / "profile",
@@ -68,9 +43,12 @@ class ProjectorCareTest : public ::testing::Test {
         clock_);
   }
   /// Looks until it is so; false after five seconds.
-  bool comes_to(ProjectorCare& care, const std::function<bool()>& so, std::uint64_t profiles = 0) {
+  bool comes_to(ProjectorCare& care,
+                const std::function<bool()>& so,
+                std::uint64_t changes = 0,
+                const std::string& profile = "profile") {
     for (int i = 0; i < 1000; ++i) {
-      care.look(profiles);
+      care.look(folder_.path() / profile, changes);
       if (so()) return true;
       std::this_thread::sleep_for(5ms);
     }
@@ -116,12 +94,22 @@ TEST_F(ProjectorCareTest, AnAlarmOutlivesSilence) {
 
 TEST_F(ProjectorCareTest, ANewProfileIsWhatItIsComparedWith) {
   const auto watched = care({{"projector.input", "video2"}});
-  ASSERT_TRUE(comes_to(*watched, [this] { return has(FaultKind::kProjectorState); }));
-  calibration::ProjectorProfile profile = render::example_profile(8, 6, 8);
-  profile.record = to_record(machine_.state);
-  ASSERT_TRUE(calibration::ProfileStore(folder_.path() / "profile").publish(profile));
-  EXPECT_TRUE(comes_to(
-      *watched, [this] { return !has(FaultKind::kProjectorState); }, 1));
+  const auto alarm = [this] { return has(FaultKind::kProjectorState); };
+  const auto no_alarm = [this] { return !has(FaultKind::kProjectorState); };
+  const auto publish = [this](const std::string& profile, const projector::ControlRecord& record) {
+    calibration::ProjectorProfile made = render::example_profile(8, 6, 8);
+    made.record = record;
+    ASSERT_TRUE(calibration::ProfileStore(folder_.path() / profile).publish(made));
+  };
+  ASSERT_TRUE(comes_to(*watched, alarm));
+  publish("profile", to_record(machine_.state));
+  EXPECT_TRUE(comes_to(*watched, no_alarm, 1));
+  publish("other", {{"projector.input", "video2"}});
+  EXPECT_TRUE(comes_to(*watched, alarm, 1, "other")) << "it is in another folder";
+  publish("other", to_record(machine_.state));
+  watched->look(folder_.path() / "other", 1);
+  EXPECT_TRUE(alarm()) << "nothing is read that is not drawn with";
+  EXPECT_TRUE(comes_to(*watched, no_alarm, 2, "other"));
 }
 
 }  // namespace

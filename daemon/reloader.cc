@@ -1,6 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/reloader.h"
 
+#include <fmt/ranges.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <string_view>
 #include <utility>
 
 namespace veneer::daemon {
@@ -12,8 +18,32 @@ namespace {
 constexpr Duration kLookInterval = std::chrono::seconds(1);
 /// A large material takes a second to read and a renderer one to make, while calls wait.
 constexpr Duration kAgain = std::chrono::seconds(3);
+/// What a reload takes, as read_all() does: keys, and tables with a dot behind. veneer.toml(5) says
+/// so too.
+constexpr std::array<std::string_view, 7> kTaken{
+    "scene", "material", "profile", "display_latency_ms", "render.", "quality.", "presence."};
+/// A rehearsal's, who reads them itself.
+constexpr std::array<std::string_view, 2> kNotOurs{"scenario.", "expect"};
+
+bool is_among(const std::string& key, std::span<const std::string_view> names) {
+  return std::ranges::any_of(names, [&key](std::string_view name) {
+    return name.ends_with('.') ? key.starts_with(name) : key == name;
+  });
+}
 
 }  // namespace
+
+std::vector<std::string> keys_left_to_a_start(const TomlReader& started, const TomlReader& now) {
+  std::vector<std::string> left;
+  for (const std::string& key : now.differences(started)) {
+    if (is_among(key, kTaken) || is_among(key, kNotOurs)) continue;
+    const std::size_t dot = key.find('.');
+    left.push_back(dot == std::string::npos
+                       ? key
+                       : fmt::format("[{}] {}", key.substr(0, dot), key.substr(dot + 1)));
+  }
+  return left;
+}
 
 Result<Config> ConfigFile::read(std::optional<TomlReader>* reader) const {
   VENEER_ASSIGN(TomlReader toml, TomlReader::open(path, settings));
@@ -25,8 +55,13 @@ Result<Config> ConfigFile::read(std::optional<TomlReader>* reader) const {
   return config;
 }
 
-Reloader::Reloader(ConfigFile file, ShowLoader& loader, Faults& faults, Clock& clock)
-    : file_(std::move(file)), loader_(loader), faults_(faults), clock_(clock) {}
+Reloader::Reloader(
+    ConfigFile file, TomlReader started, ShowLoader& loader, Faults& faults, Clock& clock)
+    : file_(std::move(file)),
+      started_(std::move(started)),
+      loader_(loader),
+      faults_(faults),
+      clock_(clock) {}
 
 // The profile has a watcher of its own; where it is refused, its folder is among them by then.
 Reloader::Stamps Reloader::stamps_of(const std::filesystem::path& config, const Script& script) {
@@ -55,7 +90,25 @@ Status Reloader::refuse(FaultKind kind, const Error& error) {
   return tl::unexpected<Error>(error);
 }
 
+// Who asks again is told again; what is tried again by itself is told once.
 Status Reloader::reload() {
+  warned_of_.clear();
+  return read_again();
+}
+
+void Reloader::warn_of_the_rest(const TomlReader& now) {
+  std::vector<std::string> left = keys_left_to_a_start(started_, now);
+  if (std::exchange(warned_of_, left) == left || left.empty()) return;
+  spdlog::warn(
+      "{}: {} differ{} from what veneerd started with: {} taken at the next start: "
+      "systemctl restart veneerd",
+      file_.path.string(),
+      fmt::join(left, ", "),
+      left.size() == 1 ? "s" : "",
+      left.size() == 1 ? "it is" : "they are");
+}
+
+Status Reloader::read_again() {
   Status status = read_all();
   if (status) {
     refused_.reset();
@@ -70,8 +123,10 @@ Status Reloader::read_all() {
   again_.reset();
   // Before they are read, so that what comes meanwhile is noticed.
   refused_ = stamps_of(file_.path, loader_.current());
-  const Result<Config> config = file_.read();
+  std::optional<TomlReader> toml;
+  const Result<Config> config = file_.read(&toml);
   if (!config) return refuse(FaultKind::kConfiguration, config.error());
+  warn_of_the_rest(*toml);
   Script named = loader_.current();
   named.config = *config;
   for (const auto& [file, stamp] : stamps_of(file_.path, named)) (*refused_)[file] = stamp;
@@ -125,7 +180,7 @@ void Reloader::look() {
   due_ = now + kLookInterval;
   bool again = again_ && now >= *again_;
   for (const auto& [file, stamp] : *refused_) again |= identify(file) != stamp;
-  if (again) (void)reload();
+  if (again) (void)read_again();
 }
 
 }  // namespace veneer::daemon

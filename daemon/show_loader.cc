@@ -206,6 +206,7 @@ Status ShowLoader::offer(std::unique_ptr<Show> show) {
   }
   // It lives until it comes back, which only this thread sees to.
   shown_ = offered;
+  ++later_shows_;
   current_ = offered->script;
   describe(*offered);
   dispose_of_used();
@@ -327,6 +328,12 @@ void ShowLoader::describe(const Show& show) {
             config.render.luminance_ceiling,
             {}};
   for (const Script::Rung& rung : show.script.rungs) names_.rungs.push_back(rung.name);
+}
+
+std::uint64_t ShowLoader::profile_changes() const {
+  const bool watched = shown_ != nullptr && shown_->profiles;
+  return later_shows_ + profile_counts().reloads +
+         (watched ? shown_->profiles->counts().reloads : 0);
 }
 
 ProfileCounts ShowLoader::profile_counts() const {

@@ -60,6 +60,9 @@ class ShowLoader {
   /// Reads the profile anew and gives it to the renderer as it is; while there is none, the next
   /// one is made of what is in the folder then.
   [[nodiscard]] Status check_profile();
+  /// Counts up whenever another profile, or the same as it was read anew, is drawn with; for the
+  /// loader's thread, as are the profiles that current() names.
+  [[nodiscard]] std::uint64_t profile_changes() const;
   /// Called by the loader's thread every now and then: what is to be looked after beside.
   void set_chore(std::function<void()> chore) { chore_ = std::move(chore); }
 
@@ -82,7 +85,7 @@ class ShowLoader {
   /// On a virtual clock, for the frame loop's own thread: what it draws with. Null for others.
   [[nodiscard]] Show* show_here() const;
 
-  /// What became of profiles, of all shows so far.
+  /// What became of profiles, of the shows that are over.
   [[nodiscard]] ProfileCounts profile_counts() const;
   /// Of the renderer that draws.
   [[nodiscard]] std::string renderer_description() const;
@@ -124,6 +127,7 @@ class ShowLoader {
   // The loader's own.
   Script current_;
   Show* shown_ = nullptr;  // the frame loop's; it lives until it comes back here
+  std::uint64_t later_shows_ = 0;
   Backoff backoff_;
   const std::atomic<bool>* given_up_ = nullptr;
 

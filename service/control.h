@@ -41,7 +41,8 @@ class ServiceControl {
   [[nodiscard]] virtual Status set_light(int index, const LightSetting& light) = 0;
   /// Dark, until it is taken back.
   [[nodiscard]] virtual Status blank(bool on) = 0;
-  /// Reads the configuration and all that it names anew; what SIGHUP does.
+  /// Reads the configuration anew, and the scene, material and profile that it names; what SIGHUP
+  /// does. What only a start takes is left as it was, with a warning in the log.
   [[nodiscard]] virtual Status reload() = 0;
   /// Writes the next frame's codes as a PNG into the state directory. Returns its path.
   [[nodiscard]] virtual Result<std::filesystem::path> snapshot() = 0;

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -71,6 +72,48 @@ TEST(Front, GoesOnWithoutWhatCannotBeHad) {
   options.reload_requested = &requested;
   const auto front = Front::start(control, options);
   EXPECT_TRUE(eventually([&] { return !control.told().empty(); })) << "the rest of it works";
+}
+
+/// A port of the loopback that was free a moment ago.
+int free_port() {
+  const UniqueFd socket(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof(address);
+  EXPECT_EQ(::bind(socket.value(), reinterpret_cast<const sockaddr*>(&address), size), 0);
+  EXPECT_EQ(::getsockname(socket.value(), reinterpret_cast<sockaddr*>(&address), &size), 0);
+  return ntohs(address.sin_port);
+}
+
+/// What Prometheus is told there; nothing where nobody listens.
+std::string scrape(int port) {
+  const UniqueFd socket(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  if (::connect(socket.value(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
+    return "";
+  const std::string question = "GET /metrics HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n";
+  EXPECT_EQ(::send(socket.value(), question.data(), question.size(), MSG_NOSIGNAL),
+            static_cast<ssize_t>(question.size()));
+  std::string answer;
+  char buffer[4096];
+  for (ssize_t got = 0; (got = ::recv(socket.value(), buffer, sizeof(buffer), 0)) > 0;)
+    answer.append(buffer, static_cast<std::size_t>(got));
+  return answer;
+}
+
+TEST(Front, AnswersPrometheusOnThePortThatItIsGiven) {
+  FakeControl control;
+  control.change([](ServiceStatus& s) { s.state = State::kBlank; });
+  FrontOptions options;
+  options.metrics_port = free_port();
+  auto front = Front::start(control, options);
+  EXPECT_THAT(scrape(options.metrics_port), HasSubstr("veneer_state{state=\"blank\"} 1"));
+  front.reset();
+  EXPECT_EQ(scrape(options.metrics_port), "");
 }
 
 TEST(Front, OffersAllOfItAndTellsSystemdOfAReloadByTheBus) {

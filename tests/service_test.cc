@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// veneer status and veneer tell, run as a person runs them, against a service on a bus of its own.
+// veneer status, tell and doctor, run as a person runs them, against a service on a bus of its own.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -83,6 +83,44 @@ TEST_F(ServiceTest, StatusSaysWhereToLookWhenThereIsNoService) {
   bus_.stop();
   EXPECT_TRUE(fails(run("veneer status " + option()), 1, "dbus-daemon"));
   EXPECT_TRUE(fails(run("veneer status --bus sytem"), 2, "is no message bus"));
+}
+
+/// What veneer doctor says, as an object, with its exit code held against it: 0 where the tools can
+/// be used, however the service is.
+nlohmann::json doctor(const std::string& options) {
+  const Outcome outcome = run("veneer doctor --json --quiet " + options);
+  auto json = nlohmann::json::parse(outcome.out);
+  bool usable = json.at("gl_usable").get<bool>();
+  for (const auto& tracker : json.at("trackers")) usable = usable && tracker.at("usable");
+  EXPECT_EQ(outcome.exit_code, usable ? 0 : 1) << outcome.out;
+  EXPECT_EQ(outcome.err, "");
+  return json;
+}
+
+TEST_F(ServiceTest, DoctorLooksAtTheServiceAndAtAllThatItNeeds) {
+  const auto json = doctor(option());
+  EXPECT_EQ(json.at("service"), nlohmann::json({{"running", true}, {"state", "degraded"}}));
+  EXPECT_GE(json.at("threads").get<int>(), 1);
+  EXPECT_TRUE(json.at("connectors_problem").get<std::string>().empty() ||
+              json.at("connectors").empty());
+
+  const Outcome text = run("veneer doctor " + option());
+  EXPECT_THAT(text.out, HasSubstr(json.at("gl").get<std::string>()));
+  EXPECT_THAT(text.out, HasSubstr("BLAS     " + json.at("blas").get<std::string>()));
+  EXPECT_THAT(text.out, HasSubstr("\nservice  degraded"));
+  EXPECT_THAT(text.err, HasSubstr("cameras")) << "which take a second";
+  // One line at least of each, whether there is one or none.
+  for (const char* kind :
+       {"tracker", "colorimeter", "camera", "light engine", "display", "connector"})
+    EXPECT_THAT(text.out, HasSubstr(fmt::format("\n{}  ", kind)));
+}
+
+TEST_F(ServiceTest, DoctorSaysWhyTheServiceCannotBeAskedAndGoesOn) {
+  server_.reset();
+  const auto service = doctor(option()).at("service");
+  EXPECT_EQ(service.at("running"), false);
+  EXPECT_THAT(service.at("problem").get<std::string>(), HasSubstr("systemctl status veneerd"));
+  EXPECT_TRUE(fails(run("veneer doctor --bus sytem"), 2, "is no message bus"));
 }
 
 TEST_F(ServiceTest, TellHasEverythingDone) {

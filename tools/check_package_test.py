@@ -56,7 +56,12 @@ class CheckPackageTest(unittest.TestCase):
             self.assertIn(said, "\n".join(listing_problems(good_listing() + [line])), line)
 
     def test_scripts_never_start_the_service(self):
-        for wrong in ("systemctl start veneerd", "systemctl enable --now veneerd.service"):
+        for wrong in (
+            "systemctl start veneerd",
+            "systemctl enable --now veneerd.service",
+            "systemctl try-restart veneerd",
+            '  echo "anew"; systemctl restart veneerd',
+        ):
             found = control_problems(scripts={"postinst": f"set -e\nsystemd-sysusers x\n{wrong}\n"})
             self.assertIn("starts the service", "\n".join(found))
         self.assertEqual(len(control_problems(scripts={"postinst": "set -e\n"})), 1)

@@ -165,8 +165,8 @@ Connectors look_at_connectors() {
 }
 
 /// How the service is, or why it cannot be asked. It need not run: the tools do without.
-nlohmann::ordered_json look_at_service(std::string& text) {
-  Result<service::BusClient> client = service::BusClient::connect({});
+nlohmann::ordered_json look_at_service(const service::BusAddress& bus, std::string& text) {
+  Result<service::BusClient> client = service::BusClient::connect(bus);
   const Result<service::ServiceStatus> status =
       client ? client->status() : tl::unexpected(client.error());
   if (!status) {
@@ -180,7 +180,14 @@ nlohmann::ordered_json look_at_service(std::string& text) {
 }  // namespace
 
 Result<int> run_doctor(CommandLine& line) {
+  std::string bus = "system";
+  line.app()
+      .add_option("--bus",
+                  bus,
+                  "Where the service is: system, session or an address such as unix:path=/run/bus")
+      ->capture_default_str();
   line.parse();
+  VENEER_ASSIGN(const service::BusAddress address, service::BusAddress::parse(bus));
   const Result<render::EglContext> egl = render::EglContext::create();
   const std::string gl = egl ? egl->description() : egl.error().what;
   const std::string blas = btf::blas_description();
@@ -194,7 +201,7 @@ Result<int> run_doctor(CommandLine& line) {
   const nlohmann::ordered_json displays = look_at_displays(displays_text);
   const Connectors connectors = look_at_connectors();
   std::string service_text;
-  const nlohmann::ordered_json service = look_at_service(service_text);
+  const nlohmann::ordered_json service = look_at_service(address, service_text);
   line.print({{"gl", gl},
               {"gl_usable", egl.has_value()},
               {"blas", blas},

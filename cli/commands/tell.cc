@@ -72,7 +72,9 @@ Result<int> run_tell(CommandLine& line) {
   };
   add("blank", "Go dark until unblank", [] { return service::Blank{true}; });
   add("unblank", "Show the picture again", [] { return service::Blank{false}; });
-  add("reload", "Read the configuration anew", [] { return service::Reload{}; });
+  add("reload",
+      "Take what was changed in the configuration's scene, material, profile and picture",
+      [] { return service::Reload{}; });
   add("snapshot", "Keep the next frame as a picture", [] { return service::Snapshot{}; });
   add("material",
       "Look as if made of this",

@@ -23,9 +23,9 @@ struct BusOptions {
 };
 
 /// veneerd on a message bus: its status as properties with signals of change, its commands as
-/// methods (docs/howto/service.md). All happens on two threads of its own: one answers and asks
-/// status(), the other has commands done, so that one that takes long holds up nothing. When the
-/// bus goes away, it comes back with the bus; calls that were being done then are not answered.
+/// methods (docs/howto/service.md). All happens on three threads of its own: one answers and asks
+/// status(), one has commands done, one goes dark, so that what takes long holds up nothing. When
+/// the bus goes away, it comes back with the bus; calls that were being done then are not answered.
 class BusServer {
  public:
   /// @param control  borrowed; must outlive the server.

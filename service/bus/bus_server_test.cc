@@ -170,6 +170,26 @@ TEST_F(BusServerTest, AnswersQuestionsWhileACommandTakesLong) {
   EXPECT_TRUE(done);
 }
 
+TEST_F(BusServerTest, GoesDarkAtOnceHoweverManyCommandsWait) {
+  serve();
+  control_.hold(true);
+  std::vector<std::thread> telling;
+  std::atomic<int> refused{0};
+  for (int i = 0; i < 20; ++i)
+    telling.emplace_back([&] {
+      if (!client().tell(Reload{})) ++refused;
+    });
+  EXPECT_TRUE(eventually([&] { return refused >= 3; })) << "nothing else is taken any more";
+  EXPECT_TRUE(eventually([&] { return !control_.told().empty(); }));
+  BusClient hurried = client();
+  EXPECT_TRUE(hurried.tell(Blank{true}));
+  EXPECT_EQ(hurried.status().value().state, State::kBlank);
+  EXPECT_TRUE(hurried.tell(Blank{false}));
+  EXPECT_THAT(control_.told(), ElementsAre("reload", "blank", "unblank"));
+  control_.hold(false);
+  for (std::thread& each : telling) each.join();
+}
+
 TEST_F(BusServerTest, RefusesCommandsOnceTooManyWait) {
   serve();
   control_.hold(true);

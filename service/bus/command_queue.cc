@@ -17,6 +17,7 @@ CommandQueue::CommandQueue(ServiceControl& control)
     : control_(control), done_fd_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   // Without one (no descriptors left) results are found when the bus thread next looks.
   thread_ = std::thread([this] { run(); });
+  blanking_thread_ = std::thread([this] { run_blanks(); });
 }
 
 CommandQueue::~CommandQueue() {
@@ -25,13 +26,20 @@ CommandQueue::~CommandQueue() {
     stop_ = true;
   }
   submitted_.notify_all();
+  blank_submitted_.notify_all();
   thread_.join();
+  blanking_thread_.join();
 }
 
 Status CommandQueue::submit(std::uint64_t id, Command command) {
   VENEER_TRY(check(command));
   {
     const std::scoped_lock lock(mutex_);
+    if (const auto* blank = std::get_if<Blank>(&command)) {
+      blanks_.push_back({id, *blank});
+      blank_submitted_.notify_one();
+      return {};
+    }
     if (jobs_.size() >= kMostWaiting)
       return fail(Errc::kTimeout,
                   "{}: {} others wait already; try again when they are done",
@@ -60,9 +68,27 @@ void CommandQueue::run() {
     lock.unlock();
     Result<std::string> result = carry_out(job.command, control_);
     lock.lock();
-    done_.push_back({job.id, std::move(result)});
-    ::eventfd_write(done_fd_.value(), 1);
+    tell(job.id, std::move(result));
   }
+}
+
+// As long as it takes until it is dark, so that several may gather meanwhile.
+void CommandQueue::run_blanks() {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    blank_submitted_.wait(lock, [this] { return stop_ || !blanks_.empty(); });
+    if (stop_) return;
+    const std::vector<WaitingBlank> waiting = std::exchange(blanks_, {});
+    lock.unlock();
+    const Result<std::string> result = carry_out(waiting.back().command, control_);
+    lock.lock();
+    for (const WaitingBlank& each : waiting) tell(each.id, result);
+  }
+}
+
+void CommandQueue::tell(std::uint64_t id, Result<std::string> result) {
+  done_.push_back({id, std::move(result)});
+  ::eventfd_write(done_fd_.value(), 1);
 }
 
 }  // namespace veneer::service

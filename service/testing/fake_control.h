@@ -30,14 +30,10 @@ class FakeControl final : public ServiceControl {
     const std::scoped_lock lock(mutex_);
     refusal_ = std::move(error);
   }
-  /// While it is held, commands take as long as that.
-  void hold(bool on) {
-    {
-      const std::scoped_lock lock(mutex_);
-      held_ = on;
-    }
-    released_.notify_all();
-  }
+  /// While it is held, commands take as long as that; all but Blank, which waits for no other.
+  void hold(bool on) { hold(held_, on); }
+  /// The same of Blank.
+  void hold_blanks(bool on) { hold(blanks_held_, on); }
   /// What it was told: "material /a", "light 1 0 0 1 500 1 1 1", in order.
   [[nodiscard]] std::vector<std::string> told() const {
     const std::scoped_lock lock(mutex_);
@@ -74,7 +70,7 @@ class FakeControl final : public ServiceControl {
                             c.z()));
   }
   [[nodiscard]] Status blank(bool on) override {
-    VENEER_TRY(note(on ? "blank" : "unblank"));
+    VENEER_TRY(note(on ? "blank" : "unblank", blanks_held_));
     change([&](ServiceStatus& s) { s.state = on ? State::kBlank : State::kRunning; });
     return {};
   }
@@ -85,10 +81,18 @@ class FakeControl final : public ServiceControl {
   }
 
  private:
-  Status note(std::string what) {
+  void hold(bool& held, bool on) {
+    {
+      const std::scoped_lock lock(mutex_);
+      held = on;
+    }
+    released_.notify_all();
+  }
+  Status note(std::string what) { return note(std::move(what), held_); }
+  Status note(std::string what, const bool& held) {
     std::unique_lock lock(mutex_);
     told_.push_back(std::move(what));
-    released_.wait(lock, [&] { return !held_; });
+    released_.wait(lock, [&] { return !held; });
     if (refusal_) return tl::unexpected(*refusal_);
     return {};
   }
@@ -99,6 +103,7 @@ class FakeControl final : public ServiceControl {
   std::vector<std::string> told_;
   std::optional<Error> refusal_;
   bool held_ = false;
+  bool blanks_held_ = false;
   std::atomic<std::uint64_t> frames_{0};
   std::atomic<std::uint64_t> refused_{0};
   mutable std::atomic<std::uint64_t> asked_{0};

@@ -130,11 +130,36 @@ expect "those were two restarts" says '^2$' unit NRestarts
 expect_within "$patience" "it shows a picture" shows_a_picture
 expect_within "$patience" "on the display" screen_is_lit
 
+# --- killed in the dark
+
+expect "it is blanked" call Blank b true
+expect_within "$patience" "the screen is dark" screen_is_dark
+third=$(unit MainPID)
+kill -KILL "$third"
+expect_within "$patience" "one that is killed in the dark is started anew" is_ready_as_another_than "$third"
+expect_within "$patience" "and is blank again" says '"blank"' get State
+before=$(frames)
+expect_within "$patience" "which it goes on to be" more_frames_than "$before"
+expect "with nothing on the screen" screen_is_dark
+expect "root takes that back" call Blank b false
+expect_within "$patience" "it shows a picture" shows_a_picture
+expect_within "$patience" "on the display" screen_is_lit
+expect "it is blanked once more" call Blank b true
+expect "that is remembered" test -e /run/veneer/dark
+
+# --- another version beneath it
+
+running=$(unit MainPID)
+expect "a package over the old one says what is left to do" says 'systemctl restart veneerd' dpkg --install --force-depends --force-unsafe-io --no-triggers --force-confold "$package"
+expect "and leaves what runs alone" test "$(unit MainPID)" = "$running"
+expect "dark as it is" says '"blank"' get State
+
 # --- stopped
 
 expect "it stops in time" timeout 30 systemctl stop veneerd
 expect "it is inactive" says '^inactive$' unit ActiveState
 expect "it ended well" says '^success$' unit Result
+expect "nothing of the dark is left" fails test -e /run/veneer/dark
 expect "it left the bus" fails busctl status "$name"
 expect "the journal has its states as fields" says '"VENEER_STATE"' journal VENEER_STATE=stopping
 expect "and its faults" says '"VENEER_FAULT"' journal VENEER_FAULT=configuration

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Keeps veneer.toml(5) and the default /etc/veneer/veneer.toml true: keys are found in the sources
-that read them, and each has to be in the page."""
+that read them, and each has to be in the page; those that a reload does not take are marked."""
 
 import pathlib
 import re
@@ -62,6 +62,19 @@ class ConfigurationTest(unittest.TestCase):
         rehearsal = {"scenario", "expect", "path", "fault"}  # tables of rehearsals
         missing = {key: file for key, file in read.items() if key not in keys_of_page() | rehearsal}
         self.assertEqual(missing, {}, f"read, but not in {PAGE.name}")
+
+    def test_what_a_reload_does_not_take_is_marked(self):
+        source = (ROOT / "daemon/reloader.cc").read_text()
+        taken = re.findall(r'"([\w.]+)"', re.search(r"kTaken\{(.*?)\};", source, re.DOTALL)[1])
+        self.assertIn("scene", taken)
+        self.assertIn("render.", taken)
+        page = PAGE.read_text()
+        top = page.split(".SH TOP LEVEL")[1].split(".SH TABLE")[0]
+        found = re.findall(r"^\\fB(\w+)\\fR(\\\(dg)? =", top, re.MULTILINE)
+        tables = re.findall(r"^\.SH TABLE \[(\w+)\]( \\\(dg)?$", page, re.MULTILINE)
+        found += [(name + ".", mark) for name, mark in tables]
+        self.assertGreater(len(found), 15)
+        self.assertEqual({name for name, mark in found if not mark}, set(taken))
 
     def test_every_key_of_the_default_configuration_is_in_the_page(self):
         default = tomllib.loads(DEFAULT.read_text())

@@ -69,6 +69,11 @@ class UnitTest(unittest.TestCase):
         self.assertEqual(options["Unit", "StartLimitIntervalSec"], ["0"])
         self.assertEqual(options["Service", "RestartPreventExitStatus"], ["2"])
 
+    def test_what_is_kept_from_one_process_to_the_next_ends_with_the_service(self):
+        options = unit_options()
+        self.assertEqual(options["Service", "RuntimeDirectory"], ["veneer"])
+        self.assertEqual(options["Service", "RuntimeDirectoryPreserve"], ["restart"])
+
     def test_only_private_networks_are_in_reach(self):
         options = unit_options()
         self.assertEqual(options["Service", "IPAddressDeny"], ["any"])
