@@ -12,21 +12,27 @@ namespace {
 /// 59.94 and 60 are both offered by many displays; further apart is another rate.
 constexpr double kRateTolerance_hz = 0.5;
 
+std::string modes_of(const KmsConnector& connector) {
+  std::string text;
+  for (const KmsMode& mode : connector.modes) {
+    if (!mode.interlaced) text += " " + name_of(mode);
+  }
+  return text;
+}
+
 std::string list_of(const std::vector<KmsConnector>& connectors) {
   if (connectors.empty()) return " the card has no connector";
   std::string text;
-  for (const KmsConnector& each : connectors) {
-    text += fmt::format("\n  {}", name_of(each));
-    if (!each.connected) {
-      text += " (nothing connected)";
-      continue;
-    }
-    text += "; modes:";
-    for (const KmsMode& mode : each.modes) {
-      if (!mode.interlaced) text += " " + name_of(mode);
-    }
-  }
+  for (const KmsConnector& each : connectors)
+    text += fmt::format("\n  {}{}",
+                        name_of(each),
+                        each.connected ? "; modes:" + modes_of(each) : " (nothing connected)");
   return text;
+}
+
+/// A projector that is off, or not yet awake, says neither its name nor its modes.
+bool is_silent(const KmsConnector& connector) {
+  return !connector.connected || connector.edid.empty();
 }
 
 struct WantedMode {
@@ -137,12 +143,24 @@ Result<KmsMode> choose_mode(const KmsConnector& connector, std::string_view mode
     if (best == nullptr || worth(each) < worth(*best)) best = &each;
   }
   if (best != nullptr) return *best;
-  if (mode.empty())
+  if (mode.empty() || connector.modes.empty())
     return fail(Errc::kUnavailable,
                 "{} offers no mode; switch the projector on and check the cable",
                 name_of(connector));
-  return fail(
-      Errc::kInvalidOption, "no mode \"{}\" there; there are:{}", mode, list_of({connector}));
+  if (is_silent(connector))
+    return fail(
+        Errc::kUnavailable,
+        "no mode \"{}\" at {}, whose display says nothing of itself. Either it is not awake "
+        "yet: switch the projector on and check the cable. Or it has no such mode; there "
+        "are:{}",
+        mode,
+        connector.name,
+        modes_of(connector));
+  return fail(Errc::kInvalidOption,
+              "no mode \"{}\" at {}; there are:{}",
+              mode,
+              name_of(connector),
+              modes_of(connector));
 }
 
 Result<DisplayChoice> choose_display(KmsDevice& device,
@@ -169,6 +187,15 @@ Result<DisplayChoice> choose_display(KmsDevice& device,
                 "there are:{}",
                 device.path(),
                 list_of(all));
+  if (fitting.empty() && (all.empty() || std::ranges::any_of(all, is_silent)))
+    return fail(
+        Errc::kUnavailable,
+        "no display on {} says that it is \"{}\". Either the projector is off or its cable "
+        "is out: switch it on and check the cable. Or the name is wrong: set connector to a "
+        "name or a serial of these:{}",
+        device.path(),
+        connector,
+        list_of(all));
   if (fitting.size() != 1)
     return fail(Errc::kInvalidOption,
                 "{} on {}; set connector to a name or a serial of these:{}",

@@ -20,15 +20,17 @@ struct DisplayChoice {
 };
 
 /// The connector of that name, or the connected one whose EDID has that monitor name or serial;
-/// with an empty text, the only connected one. Errors: kInvalidOption (no such display, or several:
-/// lists all), kUnavailable (none connected).
+/// with an empty text, the only connected one. Errors: kInvalidOption (no such display though every
+/// socket has one that says its name; or several: lists all), kUnavailable (none connected, or it
+/// may be one that is off: lists all).
 [[nodiscard]] Result<DisplayChoice> choose_display(KmsDevice& device,
                                                    std::string_view connector,
                                                    std::string_view mode);
 
 /// "1920x1080" (the display's preferred rate, or else its first) or "1920x1080@60" (the nearest
 /// rate within half a hertz); empty: the preferred mode, or else the first. Never an interlaced
-/// one. Errors: kInvalidOption (lists the modes).
+/// one. Errors: kInvalidOption (lists the modes), kUnavailable (no modes, or those that the card
+/// makes up where the display says nothing).
 [[nodiscard]] Result<KmsMode> choose_mode(const KmsConnector& connector, std::string_view mode);
 
 /// "1920x1080@60.00".
