@@ -33,6 +33,21 @@ struct DisplayChoice {
 /// makes up where the display says nothing).
 [[nodiscard]] Result<KmsMode> choose_mode(const KmsConnector& connector, std::string_view mode);
 
+/// Every socket of a card, each display asked itself.
+[[nodiscard]] Result<std::vector<KmsConnector>> sockets_of(KmsDevice& device);
+/// Whether the text, as of choose_display(), means this socket or the display in it.
+[[nodiscard]] bool fits(const KmsConnector& socket, std::string_view connector);
+/// A projector that is off, or not yet awake, says neither its name nor its modes.
+[[nodiscard]] bool is_silent(const KmsConnector& socket);
+/// One line for each, with what is plugged in and its modes.
+[[nodiscard]] std::string list_of(std::string_view path, const std::vector<KmsConnector>& sockets);
+/// What is to be done where nothing fits.
+/// @param may_come  not every display has said its name, so the text may be right.
+[[nodiscard]] Error no_such_display(std::string_view connector,
+                                    std::string_view where,
+                                    bool may_come,
+                                    std::string_view list);
+
 /// "1920x1080@60.00".
 [[nodiscard]] std::string name_of(const KmsMode& mode);
 /// "HDMI-A-1: EPSON PJ, serial 1234".

@@ -49,30 +49,6 @@ std::filesystem::path default_state_directory() {
   return all.substr(0, all.find(':'));
 }
 
-Result<std::unique_ptr<KmsDevice>> first_card() {
-  std::string reasons;
-  std::unique_ptr<KmsDevice> spare;
-  for (const std::filesystem::path& path : kms_device_paths()) {
-    Result<std::unique_ptr<KmsDevice>> device = open_kms_device(path);
-    if (!device) {
-      reasons += "\n  " + device.error().what;
-      continue;
-    }
-    VENEER_ASSIGN(const KmsResources resources, (*device)->resources());
-    for (const KmsId id : resources.connectors) {
-      const Result<KmsConnector> connector = (*device)->connector(id, false);
-      if (connector && connector->connected) return device;
-    }
-    if (!spare) spare = std::move(*device);
-  }
-  if (spare) return spare;
-  if (reasons.empty())
-    return fail(Errc::kNotFound,
-                "there is no graphics card in /dev/dri; is its driver loaded, and may this "
-                "service see it?");
-  return fail(Errc::kUnavailable, "no card can show a picture:{}", reasons);
-}
-
 }  // namespace
 
 Status KmsOutputOptions::check() const {
@@ -103,11 +79,17 @@ Result<std::unique_ptr<KmsOutput>> KmsOutput::open(TomlReader& config) {
                 "\"mapped\"",
                 buffers);
   }
+  static SteadyClock clock;
+  return open(options, cards_of_this_machine(), clock);
+}
+
+Result<std::unique_ptr<KmsOutput>> KmsOutput::open(const KmsOutputOptions& options,
+                                                   const KmsCards& cards,
+                                                   Clock& clock) {
   VENEER_TRY(options.check());
   Result<std::unique_ptr<KmsDevice>> device =
-      options.device.empty() ? first_card() : open_kms_device(options.device);
+      options.device.empty() ? choose_card(cards, options.connector) : cards.open(options.device);
   if (!device) return fail_while("opening the KMS output", device.error());
-  static SteadyClock clock;
   return open(options, std::move(*device), clock);
 }
 
