@@ -58,9 +58,10 @@ Status KmsOutputOptions::check() const {
   return {};
 }
 
-Result<std::unique_ptr<KmsOutput>> KmsOutput::open(TomlReader& config) {
+Result<std::unique_ptr<KmsOutput>> KmsOutput::open(TomlReader& config,
+                                                   const std::filesystem::path& state_directory) {
   KmsOutputOptions options;
-  options.state_directory = default_state_directory();
+  options.state_directory = state_directory.empty() ? default_state_directory() : state_directory;
   std::string buffers = "auto";
   config.read("device", options.device);
   config.read("connector", options.connector);
@@ -87,6 +88,18 @@ Result<std::unique_ptr<KmsOutput>> KmsOutput::open(const KmsOutputOptions& optio
                                                    const KmsCards& cards,
                                                    Clock& clock) {
   VENEER_TRY(options.check());
+  // Before any card is touched.
+  std::error_code error;
+  std::error_code ignored;
+  if (!options.state_directory.empty())
+    std::filesystem::create_directories(options.state_directory, error);
+  if (!options.state_directory.empty() &&
+      !std::filesystem::is_directory(options.state_directory, ignored))
+    return fail(Errc::kIo,
+                "opening the KMS output: the folder {} for the display's colour tables cannot be "
+                "made ({}); set state_directory to one that this user may write",
+                options.state_directory.string(),
+                error.message());
   Result<std::unique_ptr<KmsDevice>> device =
       options.device.empty() ? choose_card(cards, options.connector) : cards.open(options.device);
   if (!device) return fail_while("opening the KMS output", device.error());

@@ -45,10 +45,14 @@ class KmsOutput final : public Output {
   static constexpr Duration kRetryPeriod = std::chrono::milliseconds(250);
 
   /// Reads device, connector, mode, bits, bits_fallback, buffers ("auto", "gpu", "mapped") and
-  /// state_directory (default: the first folder of the environment's STATE_DIRECTORY).
+  /// state_directory.
+  /// @param state_directory  where the table says none; empty: the first folder of the
+  /// environment's
+  ///                         STATE_DIRECTORY.
   /// Errors: kInvalidOption, kNotFound, kIo, kUnavailable (nothing connected; another program has
   /// the card; 10 bits are refused).
-  [[nodiscard]] static Result<std::unique_ptr<KmsOutput>> open(TomlReader& config);
+  [[nodiscard]] static Result<std::unique_ptr<KmsOutput>> open(
+      TomlReader& config, const std::filesystem::path& state_directory);
   /// Opens what the options ask for of these cards.
   /// @param clock  of the device's flips; borrowed, must outlive the output.
   [[nodiscard]] static Result<std::unique_ptr<KmsOutput>> open(const KmsOutputOptions& options,
