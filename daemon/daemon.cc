@@ -393,8 +393,8 @@ Result<std::unique_ptr<Daemon>> Daemon::create(const std::filesystem::path& conf
   const ConfigFile file{config_path, settings};
   std::optional<TomlReader> reader;
   VENEER_ASSIGN(Config config, file.read(&reader));
-  return std::make_unique<TheDaemon>(
-      file, *reader, std::move(config), completed(std::move(devices), *reader));
+  Devices all = completed(std::move(devices), *reader, config.state_directory);
+  return std::make_unique<TheDaemon>(file, *reader, std::move(config), std::move(all));
 }
 
 }  // namespace veneer::daemon

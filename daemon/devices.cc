@@ -26,7 +26,9 @@ auto open_from(const TomlReader& toml, std::string_view key, const Open& open)
 
 }  // namespace
 
-Devices completed(Devices devices, const TomlReader& toml) {
+Devices completed(Devices devices,
+                  const TomlReader& toml,
+                  const std::filesystem::path& state_directory) {
   if (!devices.open_tracker) {
     devices.open_tracker = [toml](Clock& clock) {
       return open_from(toml, "tracker", [&clock](TomlReader& table) {
@@ -35,7 +37,11 @@ Devices completed(Devices devices, const TomlReader& toml) {
     };
   }
   if (!devices.open_output) {
-    devices.open_output = [toml] { return open_from(toml, "output", projector::open_output); };
+    devices.open_output = [toml, state_directory] {
+      return open_from(toml, "output", [&state_directory](TomlReader& table) {
+        return projector::open_output(table, state_directory);
+      });
+    };
   }
   if (!devices.open_control && toml.contains("control")) {
     devices.open_control = [toml](Clock& clock) {

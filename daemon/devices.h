@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <span>
@@ -45,6 +46,9 @@ struct Devices {
 
 /// What is empty is taken from the configuration: its tables [tracker], [output] and [control] as
 /// they were read, whatever became of the file since.
-[[nodiscard]] Devices completed(Devices devices, const TomlReader& toml);
+/// @param state_directory  of the daemon; the output's too, unless its table says another.
+[[nodiscard]] Devices completed(Devices devices,
+                                const TomlReader& toml,
+                                const std::filesystem::path& state_directory);
 
 }  // namespace veneer::daemon

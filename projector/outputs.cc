@@ -14,8 +14,13 @@ namespace veneer::projector {
 namespace {
 
 template <class T>
-Result<std::unique_ptr<Output>> open_as_output(TomlReader& config) {
-  return T::open(config);
+Result<std::unique_ptr<Output>> open_as_output(TomlReader& config,
+                                               const std::filesystem::path& state_directory) {
+  if constexpr (requires { T::open(config, state_directory); }) {
+    return T::open(config, state_directory);
+  } else {
+    return T::open(config);
+  }
 }
 
 constexpr std::array kOutputs{
@@ -32,11 +37,12 @@ static_assert(std::ranges::is_sorted(kOutputs, {}, &OutputDriver::name));
 
 std::span<const OutputDriver> output_drivers() { return kOutputs; }
 
-Result<std::unique_ptr<Output>> open_output(TomlReader& config) {
+Result<std::unique_ptr<Output>> open_output(TomlReader& config,
+                                            const std::filesystem::path& state_directory) {
   std::string name;
   config.read("driver", name);
   const auto driver = std::ranges::find(kOutputs, name, &OutputDriver::name);
-  if (driver != kOutputs.end()) return driver->open(config);
+  if (driver != kOutputs.end()) return driver->open(config, state_directory);
   std::string known;
   for (const OutputDriver& each : kOutputs) known += fmt::format(" \"{}\"", each.name);
   return fail(Errc::kInvalidOption,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <span>
 #include <string_view>
@@ -16,13 +17,18 @@ struct OutputDriver {
   std::string_view name;
   std::string_view summary;
   /// @param config  the [output] table; the driver reads its own keys, the caller calls finish().
-  Result<std::unique_ptr<Output>> (*open)(TomlReader& config);
+  /// @param state_directory  as open_output().
+  Result<std::unique_ptr<Output>> (*open)(TomlReader& config,
+                                          const std::filesystem::path& state_directory);
 };
 
 /// Every output, sorted by name: "file" (PNG of the drive codes, 8 or 16 bits, and EXR of the
 /// target if asked for; written by a thread of its own), "null", "window".
 [[nodiscard]] std::span<const OutputDriver> output_drivers();
 /// Opens the output that the key `driver` of the table names.
-[[nodiscard]] Result<std::unique_ptr<Output>> open_output(TomlReader& config);
+/// @param state_directory  where a driver keeps what is to outlive it, unless its own table says
+///                         another; empty: the driver's own choice.
+[[nodiscard]] Result<std::unique_ptr<Output>> open_output(
+    TomlReader& config, const std::filesystem::path& state_directory = {});
 
 }  // namespace veneer::projector

@@ -12,19 +12,10 @@ namespace {
 /// 59.94 and 60 are both offered by many displays; further apart is another rate.
 constexpr double kRateTolerance_hz = 0.5;
 
-std::string list_of(const std::vector<KmsConnector>& connectors) {
-  if (connectors.empty()) return " the card has no connector";
+std::string modes_of(const KmsConnector& connector) {
   std::string text;
-  for (const KmsConnector& each : connectors) {
-    text += fmt::format("\n  {}", name_of(each));
-    if (!each.connected) {
-      text += " (nothing connected)";
-      continue;
-    }
-    text += "; modes:";
-    for (const KmsMode& mode : each.modes) {
-      if (!mode.interlaced) text += " " + name_of(mode);
-    }
+  for (const KmsMode& mode : connector.modes) {
+    if (!mode.interlaced) text += " " + name_of(mode);
   }
   return text;
 }
@@ -103,6 +94,62 @@ Result<KmsPlane> choose_plane(KmsDevice& device, const KmsResources& resources, 
 
 }  // namespace
 
+Result<std::vector<KmsConnector>> sockets_of(KmsDevice& device) {
+  VENEER_ASSIGN(const KmsResources resources, device.resources());
+  std::vector<KmsConnector> all;
+  for (const KmsId id : resources.connectors) {
+    VENEER_ASSIGN(KmsConnector each, device.connector(id, true));
+    all.push_back(std::move(each));
+  }
+  return all;
+}
+
+bool fits(const KmsConnector& socket, std::string_view connector) {
+  if (connector.empty()) return socket.connected;
+  if (socket.name == connector) return true;
+  const EdidIdentity identity = read_edid(socket.edid);
+  return socket.connected && (identity.name == connector || identity.serial == connector);
+}
+
+bool is_silent(const KmsConnector& socket) { return !socket.connected || socket.edid.empty(); }
+
+std::string list_of(std::string_view path, const std::vector<KmsConnector>& sockets) {
+  if (sockets.empty()) return fmt::format("\n  {}: the card has no connector", path);
+  std::string text;
+  for (const KmsConnector& each : sockets)
+    text += fmt::format("\n  {} {}{}",
+                        path,
+                        name_of(each),
+                        each.connected ? "; modes:" + modes_of(each) : " (nothing connected)");
+  return text;
+}
+
+Error no_such_display(std::string_view connector,
+                      std::string_view where,
+                      bool may_come,
+                      std::string_view list) {
+  if (connector.empty())
+    return {Errc::kUnavailable,
+            fmt::format("no display is connected to {}; switch the projector on and check the "
+                        "cable; there are:{}",
+                        where,
+                        list)};
+  if (may_come)
+    return {Errc::kUnavailable,
+            fmt::format("no display on {} says that it is \"{}\". Either the projector is off or "
+                        "its cable is out: switch it on and check the cable. Or the name is wrong: "
+                        "set connector to a name or a serial of these:{}",
+                        where,
+                        connector,
+                        list)};
+  return {Errc::kInvalidOption,
+          fmt::format("there is no display \"{}\" on {}; set connector to a name or a serial of "
+                      "these:{}",
+                      connector,
+                      where,
+                      list)};
+}
+
 std::string name_of(const KmsMode& mode) {
   return fmt::format("{}x{}@{:.2f}", mode.width, mode.height, mode.refresh_hz);
 }
@@ -137,45 +184,46 @@ Result<KmsMode> choose_mode(const KmsConnector& connector, std::string_view mode
     if (best == nullptr || worth(each) < worth(*best)) best = &each;
   }
   if (best != nullptr) return *best;
-  if (mode.empty())
+  if (mode.empty() || connector.modes.empty())
     return fail(Errc::kUnavailable,
                 "{} offers no mode; switch the projector on and check the cable",
                 name_of(connector));
-  return fail(
-      Errc::kInvalidOption, "no mode \"{}\" there; there are:{}", mode, list_of({connector}));
+  if (is_silent(connector))
+    return fail(
+        Errc::kUnavailable,
+        "no mode \"{}\" at {}, whose display says nothing of itself. Either it is not awake "
+        "yet: switch the projector on and check the cable. Or it has no such mode; there "
+        "are:{}",
+        mode,
+        connector.name,
+        modes_of(connector));
+  return fail(Errc::kInvalidOption,
+              "no mode \"{}\" at {}; there are:{}",
+              mode,
+              name_of(connector),
+              modes_of(connector));
 }
 
 Result<DisplayChoice> choose_display(KmsDevice& device,
                                      std::string_view connector,
                                      std::string_view mode) {
   VENEER_ASSIGN(const KmsResources resources, device.resources());
-  std::vector<KmsConnector> all;
-  for (const KmsId id : resources.connectors) {
-    VENEER_ASSIGN(KmsConnector each, device.connector(id, true));
-    all.push_back(std::move(each));
-  }
+  VENEER_ASSIGN(const std::vector<KmsConnector> all, sockets_of(device));
   std::vector<const KmsConnector*> fitting;
   for (const KmsConnector& each : all) {
-    const EdidIdentity identity = read_edid(each.edid);
-    if (connector.empty()
-            ? each.connected
-            : each.name == connector ||
-                  (each.connected && (identity.name == connector || identity.serial == connector)))
-      fitting.push_back(&each);
+    if (fits(each, connector)) fitting.push_back(&each);
   }
-  if (fitting.empty() && connector.empty())
-    return fail(Errc::kUnavailable,
-                "no display is connected to {}; switch the projector on and check the cable; "
-                "there are:{}",
-                device.path(),
-                list_of(all));
-  if (fitting.size() != 1)
+  if (fitting.empty())
+    return tl::unexpected<Error>(no_such_display(connector,
+                                                 device.path(),
+                                                 all.empty() || std::ranges::any_of(all, is_silent),
+                                                 list_of(device.path(), all)));
+  if (fitting.size() > 1)
     return fail(Errc::kInvalidOption,
-                "{} on {}; set connector to a name or a serial of these:{}",
-                fitting.empty() ? fmt::format("there is no display \"{}\"", connector)
-                                : fmt::format("{} displays would do", fitting.size()),
+                "{} displays on {} would do; set connector to a name or a serial of these:{}",
+                fitting.size(),
                 device.path(),
-                list_of(all));
+                list_of(device.path(), all));
   DisplayChoice choice;
   choice.connector = *fitting.front();
   choice.identity = read_edid(choice.connector.edid);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/exit_code.h"
 #include "projector/outputs/kms/fake_kms_device.h"
 
 namespace veneer::projector {
@@ -44,6 +45,7 @@ TEST_F(DisplayChoiceTest, NoNameIsEnoughWhereOneDisplayIsConnected) {
 }
 
 TEST_F(DisplayChoiceTest, ListsAllThatThereAreWhereItIsNotClear) {
+  card_.connectors[2] = {"DP-2", fake_edid("LG", "C3"), true, {fake_mode(800, 600, 60)}};
   for (const char* name : {"", "DP-9", "SONY"}) {
     const auto choice = choose(name);
     ASSERT_FALSE(choice) << name;
@@ -73,6 +75,41 @@ TEST_F(DisplayChoiceTest, WhatIsUnpluggedIsUnavailable) {
   card_.connectors.clear();
   EXPECT_FALSE(choose(""));
   EXPECT_FALSE(choose("DP-1"));
+}
+
+// What systemd makes of it: a status of 2 ends the service for good, any other starts it anew.
+TEST_F(DisplayChoiceTest, ANameThatMayBeThatOfAProjectorThatIsOffIsTriedAgain) {
+  const FakeConnector on = card_.connectors[0];
+  const FakeConnector dark{"HDMI-A-1", "", false, {}};
+  const FakeConnector asleep{"HDMI-A-1", "", true, {fake_mode(1024, 768, 60)}};
+  card_.connectors.pop_back();
+  for (const FakeConnector& off : {dark, asleep}) {
+    card_.connectors[0] = off;
+    for (const char* name : {"EPSON PJ", "A1"}) {
+      const auto choice = choose(name);
+      ASSERT_FALSE(choice);
+      EXPECT_EQ(exit_code_of(choice.error()), kExitFailed) << choice.error().what;
+      for (const char* part : {"cable", "name is wrong", name, "HDMI-A-1", "DELL"})
+        EXPECT_NE(choice.error().what.find(part), std::string::npos)
+            << part << " is not in: " << choice.error().what;
+    }
+  }
+  card_.connectors[0] = on;
+  EXPECT_TRUE(choose("EPSON PJ"));
+  EXPECT_EQ(exit_code_of(choose("EPSON PK").error()), kExitUsage);
+}
+
+TEST_F(DisplayChoiceTest, AModeThatADisplayMayNotHaveToldYetIsTriedAgain) {
+  card_.connectors[0].edid.clear();
+  for (const auto& made_up : std::vector<std::vector<KmsMode>>{{}, {fake_mode(1024, 768, 60)}}) {
+    card_.connectors[0].modes = made_up;
+    const auto choice = choose("HDMI-A-1", "1920x1080");
+    ASSERT_FALSE(choice);
+    EXPECT_EQ(exit_code_of(choice.error()), kExitFailed) << choice.error().what;
+    EXPECT_NE(choice.error().what.find("cable"), std::string::npos) << choice.error().what;
+  }
+  card_.connectors[0].edid = fake_edid("EPSON PJ", "A1");
+  EXPECT_EQ(exit_code_of(choose("HDMI-A-1", "1920x1080").error()), kExitUsage);
 }
 
 TEST_F(DisplayChoiceTest, TheModeIsTheNearestRateOfThatSize) {

@@ -53,6 +53,7 @@ struct FakeConnector {
 
 /// A card that a test arranges, with its faults; outlives the devices that open it.
 struct FakeCard {
+  std::string path = "/dev/dri/card7";
   FakeHardware* hardware = nullptr;
   std::vector<FakeConnector> connectors;
   int crtcs = 2;
@@ -101,7 +102,7 @@ class FakeKmsDevice final : public KmsDevice {
   [[nodiscard]] static KmsId primary_id(std::size_t i) { return static_cast<KmsId>(300 + 2 * i); }
   [[nodiscard]] static KmsId cursor_id(std::size_t i) { return static_cast<KmsId>(301 + 2 * i); }
 
-  [[nodiscard]] std::string path() const override { return "/dev/dri/card7"; }
+  [[nodiscard]] std::string path() const override { return card_.path; }
   [[nodiscard]] std::string driver() const override { return "fake"; }
   [[nodiscard]] Result<KmsResources> resources() override;
   [[nodiscard]] Result<KmsConnector> connector(KmsId id, bool probe) override;

@@ -49,30 +49,6 @@ std::filesystem::path default_state_directory() {
   return all.substr(0, all.find(':'));
 }
 
-Result<std::unique_ptr<KmsDevice>> first_card() {
-  std::string reasons;
-  std::unique_ptr<KmsDevice> spare;
-  for (const std::filesystem::path& path : kms_device_paths()) {
-    Result<std::unique_ptr<KmsDevice>> device = open_kms_device(path);
-    if (!device) {
-      reasons += "\n  " + device.error().what;
-      continue;
-    }
-    VENEER_ASSIGN(const KmsResources resources, (*device)->resources());
-    for (const KmsId id : resources.connectors) {
-      const Result<KmsConnector> connector = (*device)->connector(id, false);
-      if (connector && connector->connected) return device;
-    }
-    if (!spare) spare = std::move(*device);
-  }
-  if (spare) return spare;
-  if (reasons.empty())
-    return fail(Errc::kNotFound,
-                "there is no graphics card in /dev/dri; is its driver loaded, and may this "
-                "service see it?");
-  return fail(Errc::kUnavailable, "no card can show a picture:{}", reasons);
-}
-
 }  // namespace
 
 Status KmsOutputOptions::check() const {
@@ -82,9 +58,10 @@ Status KmsOutputOptions::check() const {
   return {};
 }
 
-Result<std::unique_ptr<KmsOutput>> KmsOutput::open(TomlReader& config) {
+Result<std::unique_ptr<KmsOutput>> KmsOutput::open(TomlReader& config,
+                                                   const std::filesystem::path& state_directory) {
   KmsOutputOptions options;
-  options.state_directory = default_state_directory();
+  options.state_directory = state_directory.empty() ? default_state_directory() : state_directory;
   std::string buffers = "auto";
   config.read("device", options.device);
   config.read("connector", options.connector);
@@ -103,11 +80,29 @@ Result<std::unique_ptr<KmsOutput>> KmsOutput::open(TomlReader& config) {
                 "\"mapped\"",
                 buffers);
   }
-  VENEER_TRY(options.check());
-  Result<std::unique_ptr<KmsDevice>> device =
-      options.device.empty() ? first_card() : open_kms_device(options.device);
-  if (!device) return fail_while("opening the KMS output", device.error());
   static SteadyClock clock;
+  return open(options, cards_of_this_machine(), clock);
+}
+
+Result<std::unique_ptr<KmsOutput>> KmsOutput::open(const KmsOutputOptions& options,
+                                                   const KmsCards& cards,
+                                                   Clock& clock) {
+  VENEER_TRY(options.check());
+  // Before any card is touched.
+  std::error_code error;
+  std::error_code ignored;
+  if (!options.state_directory.empty())
+    std::filesystem::create_directories(options.state_directory, error);
+  if (!options.state_directory.empty() &&
+      !std::filesystem::is_directory(options.state_directory, ignored))
+    return fail(Errc::kIo,
+                "opening the KMS output: the folder {} for the display's colour tables cannot be "
+                "made ({}); set state_directory to one that this user may write",
+                options.state_directory.string(),
+                error.message());
+  Result<std::unique_ptr<KmsDevice>> device =
+      options.device.empty() ? choose_card(cards, options.connector) : cards.open(options.device);
+  if (!device) return fail_while("opening the KMS output", device.error());
   return open(options, std::move(*device), clock);
 }
 

@@ -9,6 +9,7 @@
 
 #include "base/toml_reader.h"
 #include "projector/output.h"
+#include "projector/outputs/kms/card_choice.h"
 #include "projector/outputs/kms/colour_state.h"
 #include "projector/outputs/kms/display_choice.h"
 #include "projector/outputs/kms/kms_device.h"
@@ -21,7 +22,7 @@ struct KmsOutputOptions {
     kGpu,     ///< the renderer draws into what is scanned out
     kMapped,  ///< present() writes the pixels
   };
-  std::filesystem::path device;  ///< empty: the first card with a display
+  std::filesystem::path device;  ///< empty: as choose_card()
   std::string connector;         ///< as choose_display()
   std::string mode;              ///< as choose_mode()
   int bits = 8;                  ///< of a channel: 8 or 10
@@ -44,11 +45,19 @@ class KmsOutput final : public Output {
   static constexpr Duration kRetryPeriod = std::chrono::milliseconds(250);
 
   /// Reads device, connector, mode, bits, bits_fallback, buffers ("auto", "gpu", "mapped") and
-  /// state_directory (default: the first folder of the environment's STATE_DIRECTORY).
+  /// state_directory.
+  /// @param state_directory  where the table says none; empty: the first folder of the
+  /// environment's
+  ///                         STATE_DIRECTORY.
   /// Errors: kInvalidOption, kNotFound, kIo, kUnavailable (nothing connected; another program has
   /// the card; 10 bits are refused).
-  [[nodiscard]] static Result<std::unique_ptr<KmsOutput>> open(TomlReader& config);
+  [[nodiscard]] static Result<std::unique_ptr<KmsOutput>> open(
+      TomlReader& config, const std::filesystem::path& state_directory);
+  /// Opens what the options ask for of these cards.
   /// @param clock  of the device's flips; borrowed, must outlive the output.
+  [[nodiscard]] static Result<std::unique_ptr<KmsOutput>> open(const KmsOutputOptions& options,
+                                                               const KmsCards& cards,
+                                                               Clock& clock);
   [[nodiscard]] static Result<std::unique_ptr<KmsOutput>> open(const KmsOutputOptions& options,
                                                                std::unique_ptr<KmsDevice> device,
                                                                Clock& clock);

@@ -434,6 +434,18 @@ TEST_F(KmsOutputTest, OptionsOutOfRangeAreRefused) {
   }
 }
 
+TEST(KmsOutputState, IsWhereTheTableSaysOrElseTheCaller) {
+  const auto refused = [](const std::string& keys) {
+    auto toml = TomlReader::parse("driver = \"kms\"\n" + keys, "test");
+    const auto output = open_output(*toml, "/proc/of-the-caller");
+    return output ? std::string() : output.error().what;
+  };
+  EXPECT_NE(refused("").find("/proc/of-the-caller"), std::string::npos) << refused("");
+  const std::string own = refused("state_directory = \"/proc/of-the-table\"");
+  EXPECT_NE(own.find("/proc/of-the-table"), std::string::npos) << own;
+  EXPECT_NE(own.find("may write"), std::string::npos) << own;
+}
+
 class KmsGpuTest : public KmsOutputTest {
  protected:
   KmsGpuTest() {
