@@ -3,6 +3,8 @@
 
 #include <fmt/ranges.h>
 
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "calibration/profile_store.h"
@@ -10,6 +12,23 @@
 namespace veneer::daemon {
 
 using service::FaultKind;
+
+namespace {
+
+/// What changed and what is wrong now, each in words of its own: only the first can be set back.
+std::string alarm_of(const projector::ControlReport& report) {
+  std::string text;
+  if (!report.changes.empty())
+    text = fmt::format("since the profile was measured: {}; set it back, or calibrate again",
+                       fmt::join(report.changes, "; "));
+  if (!report.warnings.empty())
+    text += fmt::format("{}the projector spoils the colours now: {}",
+                        text.empty() ? "" : ". And ",
+                        fmt::join(report.warnings, "; "));
+  return text;
+}
+
+}  // namespace
 
 ProjectorCare::ProjectorCare(projector::ControlWatch::Open open,
                              projector::ControlRecord kept,
@@ -39,16 +58,10 @@ void ProjectorCare::look(const std::filesystem::path& profile, std::uint64_t cha
     return;  // what it said last still holds, for all that is known
   }
   faults_.end(FaultKind::kProjector, now);
-  std::vector<std::string> wrong = report.changes;
-  wrong.insert(wrong.end(), report.warnings.begin(), report.warnings.end());
-  if (wrong.empty()) {
+  if (report.changes.empty() && report.warnings.empty())
     faults_.end(FaultKind::kProjectorState, now);
-  } else {
-    faults_.begin(FaultKind::kProjectorState,
-                  now,
-                  fmt::format("since the profile was measured: {}; set it back, or calibrate again",
-                              fmt::join(wrong, "; ")));
-  }
+  else
+    faults_.begin(FaultKind::kProjectorState, now, alarm_of(report));
 }
 
 }  // namespace veneer::daemon

@@ -83,6 +83,28 @@ TEST_F(ProjectorCareTest, WhatIsNotAsItWasIsAnAlarmUntilItIsSetBack) {
   EXPECT_TRUE(comes_to(*watched, [this] { return !has(FaultKind::kProjectorState); }));
 }
 
+TEST_F(ProjectorCareTest, WhatTheProfileWasMeasuredWithIsNoAlarm) {
+  machine_.state.degamma = true;
+  machine_.state.health["filter"] = projector::Health::kWarning;
+  const auto watched = care(to_record(machine_.state));
+  const std::function<bool()> seen = [&] {
+    return watched->text().find("filter warning") != std::string::npos;
+  };
+  ASSERT_TRUE(comes_to(*watched, seen));
+  watched->look(0);
+  EXPECT_FALSE(has(FaultKind::kProjectorState)) << faults_.list().front().text;
+}
+
+TEST_F(ProjectorCareTest, WhatIsWrongNowIsNotSaidToHaveChanged) {
+  const auto watched = care(to_record(machine_.state));
+  machine_.set([](auto& state) { state.health["fan"] = projector::Health::kWarning; });
+  ASSERT_TRUE(comes_to(*watched, [this] { return has(FaultKind::kProjectorState); }));
+  const std::string text = faults_.list().front().text;
+  EXPECT_NE(text.find("fan warning"), std::string::npos) << text;
+  EXPECT_EQ(text.find("since the profile"), std::string::npos) << text;
+  EXPECT_EQ(text.find("set it back"), std::string::npos) << text;
+}
+
 TEST_F(ProjectorCareTest, AnAlarmOutlivesSilence) {
   const auto watched = care(to_record(machine_.state));
   machine_.set([](auto& state) { state.muted = true; });

@@ -53,6 +53,18 @@ std::vector<int> numbers_of(const std::string& text) {
   return numbers;
 }
 
+bool holds(const ControlRecord& record, std::string_view name, std::string_view value) {
+  const std::string* const found = find(record, name);
+  return found != nullptr && *found == value;
+}
+
+/// Whether a part was in no better health than it is now.
+bool holds_health(const ControlRecord& record, const std::string& part, Health now) {
+  const std::string name = "health." + part;
+  return holds(record, name, name_of(Health::kError)) ||
+         (now == Health::kWarning && holds(record, name, name_of(now)));
+}
+
 tl::unexpected<Error> cannot(const ProjectorControl& control, std::string_view what) {
   return fail(Errc::kUnavailable,
               "{}: it has no command to {}; do it in the projector's own menu if it is there",
@@ -156,20 +168,22 @@ std::vector<std::string> differences(const ProjectorState& then, const Projector
   return differences(to_record(then), to_record(now));
 }
 
-std::vector<std::string> warnings(const ProjectorState& state) {
+std::vector<std::string> warnings(const ProjectorState& state) { return warnings(state, {}); }
+
+std::vector<std::string> warnings(const ProjectorState& state, const ControlRecord& kept) {
   std::vector<std::string> result;
   if (state.power != Power::kOn && state.power != Power::kUnknown)
     result.push_back(fmt::format("it is {}, not on", name_of(state.power)));
   if (state.frozen == true)
     result.push_back("the picture is frozen: what is drawn does not show; unfreeze it");
   if (state.muted == true) result.push_back("the picture is blanked; unblank it");
-  if (state.degamma == true)
+  if (state.degamma == true && !holds(kept, "degamma", "on"))
     result.push_back(
         "its own tone curve (degamma) is on: switch it off, or calibrate with it and leave it");
-  if (state.locked == false)
+  if (state.locked == false && !holds(kept, "locked", "off"))
     result.push_back("it is not locked to a signal: see to the cable, the input and the mode");
   for (const auto& [part, health] : state.health)
-    if (health != Health::kOk)
+    if (health != Health::kOk && !holds_health(kept, part, health))
       result.push_back(fmt::format("it reports: {} {}; see its manual", part, name_of(health)));
   return result;
 }

@@ -63,6 +63,10 @@ using ControlRecord = std::map<std::string, std::string>;
 /// What would spoil the colours now, and what to do about it: frozen, muted, degamma on, no
 /// lock, a device that is not on, health that is not ok. Empty where all is well.
 [[nodiscard]] std::vector<std::string> warnings(const ProjectorState& state);
+/// The same without what a profile was measured with, by its record: degamma on, no lock, and parts
+/// in no better health. Not on, frozen or muted hides the picture, whatever was measured.
+[[nodiscard]] std::vector<std::string> warnings(const ProjectorState& state,
+                                                const ControlRecord& kept);
 
 /// The machine behind the lens: a way to ask it and to command it, apart from the picture's own.
 ///

@@ -117,6 +117,31 @@ TEST(ProjectorState, WhatSpoilsColoursIsWarnedOf) {
                           HasSubstr("fan error")));
 }
 
+TEST(ProjectorState, WhatWasSoWhenItWasMeasuredIsNotWarnedOf) {
+  ProjectorState then = whole_state();
+  then.degamma = true;
+  then.locked = false;
+  then.health = {{"fan", Health::kWarning}, {"lamp", Health::kError}};
+  EXPECT_EQ(warnings(then).size(), 4U);
+  EXPECT_THAT(warnings(then, to_record(then)), IsEmpty());
+  ProjectorState now = then;
+  now.health["lamp"] = Health::kWarning;  // better than it was
+  EXPECT_THAT(warnings(now, to_record(then)), IsEmpty());
+  now.health["fan"] = Health::kError;  // worse
+  EXPECT_THAT(warnings(now, to_record(then)), ElementsAre(HasSubstr("fan error")));
+  // A record that says otherwise, or nothing, takes no warning away.
+  EXPECT_EQ(warnings(then, to_record(whole_state())), warnings(then));
+  EXPECT_EQ(warnings(then, {}), warnings(then));
+}
+
+TEST(ProjectorState, NoRecordMakesAHiddenPictureRight) {
+  ProjectorState hidden = whole_state();
+  hidden.power = Power::kOff;
+  hidden.frozen = true;
+  hidden.muted = true;
+  EXPECT_EQ(warnings(hidden, to_record(hidden)).size(), 3U);
+}
+
 /// Has only what every control must have.
 class PlainControl final : public ProjectorControl {
  public:

@@ -11,15 +11,22 @@ constexpr double kLeastPeriod_s = 1;
 constexpr double kLeastPeriodOverNetwork_s = 10;
 constexpr double kMostPeriod_s = 3600;
 
-/// Without the changes.
-ControlReport report_of(const ProjectorState& state, const std::string& description) {
+void compare(ControlReport& report, const ControlRecord& kept) {
+  if (!report.state) return;
+  report.changes = differences(kept, to_record(*report.state));
+  report.warnings = warnings(*report.state, kept);
+}
+
+ControlReport report_of(const ProjectorState& state,
+                        const std::string& description,
+                        const ControlRecord& kept) {
   ControlReport report;
   report.asked = true;
   report.reachable = true;
   report.text = description + ": " + summary_of(state);
-  report.warnings = warnings(state);
   report.state = state;
   report.read = SteadyClock{}.now();
+  compare(report, kept);
   return report;
 }
 
@@ -60,8 +67,7 @@ ControlReport look_at(ProjectorControl& control, const ControlRecord& kept) {
   const Result<ProjectorState> state = control.read_state();
   ControlReport report;
   if (state) {
-    report = report_of(*state, control.description());
-    report.changes = differences(kept, to_record(*state));
+    report = report_of(*state, control.description(), kept);
   } else {
     report.asked = true;
     report.failures = 1;
@@ -95,7 +101,7 @@ ControlReport ControlWatch::report() const {
 void ControlWatch::keep(const ControlRecord& kept) {
   const std::lock_guard lock(mutex_);
   kept_ = kept;
-  if (report_.state) report_.changes = differences(kept_, to_record(*report_.state));
+  compare(report_, kept_);
 }
 
 void ControlWatch::watch() {
@@ -139,11 +145,8 @@ Duration ControlWatch::pause() const {
 }
 
 void ControlWatch::tell(const ProjectorState& state, const std::string& description) {
-  ControlReport report = report_of(state, description);
-  const ControlRecord now = to_record(state);
   const std::lock_guard lock(mutex_);
-  report.changes = differences(kept_, now);
-  report_ = std::move(report);
+  report_ = report_of(state, description, kept_);
 }
 
 void ControlWatch::tell(const Error& error) {

@@ -41,8 +41,9 @@ struct ControlReport {
   bool reachable = false;  ///< the last question was answered
   /// A line: the projector and its state, or what went wrong and what to do.
   std::string text;
-  /// What is not as it was when the profile was measured, and what would spoil colours now, a
-  /// sentence each: of the last state that was read, though the projector be lost since.
+  /// What is not as it was when the profile was measured, and what would spoil colours now and was
+  /// not so then, a sentence each: of the last state that was read, though the projector be lost
+  /// since.
   std::vector<std::string> changes;
   std::vector<std::string> warnings;
   std::optional<ProjectorState> state;  ///< the last that was read

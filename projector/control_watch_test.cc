@@ -148,6 +148,7 @@ TEST(ControlWatch, WhatTheProfileDoesNotKnowIsNoDifference) {
 TEST(ControlWatch, AnotherProfileIsComparedWithAtOnce) {
   Script script;
   script.state = lit();
+  script.state.degamma = true;
   ControlWatch watch(
       opener_of(script), to_record(lit()), {.period = 1h, .first_pause = 1h, .longest_pause = 1h});
   ASSERT_TRUE(wait_for(watch, is_reachable).reachable);
@@ -155,6 +156,10 @@ TEST(ControlWatch, AnotherProfileIsComparedWithAtOnce) {
   other.input = "digital2";
   watch.keep(to_record(other));
   EXPECT_THAT(watch.report().changes, ElementsAre(HasSubstr("digital2")));
+  EXPECT_THAT(watch.report().warnings, ElementsAre(HasSubstr("degamma")));
+  other.degamma = true;
+  watch.keep(to_record(other));
+  EXPECT_THAT(watch.report().warnings, IsEmpty());
   watch.keep({});
   EXPECT_THAT(watch.report().changes, IsEmpty());
   EXPECT_EQ(script.asked, 1);

@@ -97,7 +97,8 @@ std::string Pjlink::description() const {
 Status Pjlink::connect() {
   const Time deadline = SteadyClock{}.now() + options_.time_limit;
   VENEER_ASSIGN(pjlink::Connection made,
-                pjlink::Connection::open(options_.host, options_.port, deadline, stop_.value()));
+                pjlink::Connection::open(
+                    options_.host, options_.port, deadline, stop_.value(), options_.resolve));
   VENEER_ASSIGN(const std::string line, made.read_line(deadline));
   VENEER_ASSIGN(const pjlink::Greeting greeting, pjlink::read_greeting(line));
   digest_.clear();

@@ -11,6 +11,7 @@
 #include "base/toml_reader.h"
 #include "base/unique_handle.h"
 #include "projector/control.h"
+#include "projector/control/pjlink/name_lookup.h"
 #include "projector/control/pjlink/pjlink_connection.h"
 #include "projector/control/pjlink/pjlink_protocol.h"
 
@@ -26,6 +27,8 @@ struct PjlinkOptions {
   Duration shortest_period = std::chrono::seconds(2);
   /// Projectors hang up on who says nothing for 30 s; we are gone before.
   Duration longest_idle = std::chrono::seconds(25);
+  /// How a host that is a name is looked up; bounded by the time limit, whatever it does.
+  pjlink::Resolve resolve = pjlink::resolve_by_system;
   /// Keys: host, port, password or password_file (its first line), time_limit_s.
   /// Errors: kInvalidOption, kNotFound (the password's file).
   [[nodiscard]] static Result<PjlinkOptions> read(TomlReader& config);

@@ -1,54 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "projector/control/pjlink/pjlink_connection.h"
 
-#include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
-#include <poll.h>
 #include <sys/socket.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <ctime>
-#include <memory>
 #include <utility>
 
+#include "projector/control/pjlink/internal_wait.h"
 #include "projector/control/pjlink/pjlink_protocol.h"
 
 namespace veneer::projector::pjlink {
 namespace {
 
-struct FreeAddresses {
-  void operator()(addrinfo* list) const noexcept { ::freeaddrinfo(list); }
-};
-using Addresses = std::unique_ptr<addrinfo, FreeAddresses>;
-
-enum class Wait { kReady, kTooLate, kStopped };
-
-/// For one of `events` (or an error) on the socket, until the deadline, while nobody says stop.
-Wait wait_for(int fd, short events, int stop, Time deadline) {
-  while (true) {
-    const Duration left = std::max(deadline - SteadyClock{}.now(), Duration{0});
-    const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(left);
-    const timespec timeout{static_cast<time_t>(seconds.count()),
-                           static_cast<long>((left - seconds).count())};
-    std::array<pollfd, 2> entries{pollfd{fd, events, 0}, pollfd{stop, POLLIN, 0}};
-    const int count = ::ppoll(entries.data(), entries.size(), &timeout, nullptr);
-    if (count > 0 && entries[1].revents != 0) return Wait::kStopped;
-    if (count >= 0) return count > 0 ? Wait::kReady : Wait::kTooLate;
-    if (errno != EINTR) return Wait::kReady;  // the call that follows says what is wrong
-  }
-}
-
 /// 0 or an error number; EINPROGRESS where the deadline passed first, ECANCELED where somebody said
 /// stop.
-int connect_to(const addrinfo& address, Time deadline, int stop, UniqueFd& socket) {
+int connect_to(const Endpoint& to, Time deadline, int stop, UniqueFd& socket) {
   socket = UniqueFd(
-      ::socket(address.ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, address.ai_protocol));
+      ::socket(to.address.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, IPPROTO_TCP));
   if (!socket) return errno;
-  if (::connect(socket.value(), address.ai_addr, address.ai_addrlen) == 0) return 0;
+  if (::connect(socket.value(), reinterpret_cast<const sockaddr*>(&to.address), to.size) == 0)
+    return 0;
   if (errno != EINPROGRESS && errno != EINTR) return errno;
   const Wait waited = wait_for(socket.value(), POLLOUT, stop, deadline);
   if (waited != Wait::kReady) return waited == Wait::kStopped ? ECANCELED : EINPROGRESS;
@@ -95,24 +71,15 @@ tl::unexpected<Error> too_slow(const std::string& name, std::string_view begun) 
 
 }  // namespace
 
-Result<Connection> Connection::open(const std::string& host, int port, Time deadline, int stop) {
-  const std::string name = host.find(':') == std::string::npos ? fmt::format("{}:{}", host, port)
-                                                               : fmt::format("[{}]:{}", host, port);
-  addrinfo hints{};
-  hints.ai_flags = AI_NUMERICSERV;
-  hints.ai_socktype = SOCK_STREAM;
-  addrinfo* list = nullptr;
-  const int looked_up = ::getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &list);
-  if (looked_up != 0)
-    return fail(Errc::kNotFound,
-                "connecting to {}: {}; check the name, or write the address in numbers",
-                name,
-                ::gai_strerror(looked_up));
-  const Addresses addresses(list);
-  int error = 0;
-  for (const addrinfo* each = addresses.get(); each != nullptr; each = each->ai_next) {
+Result<Connection> Connection::open(
+    const std::string& host, int port, Time deadline, int stop, const Resolve& resolve) {
+  const std::string name = place_of(host, port);
+  VENEER_ASSIGN(const std::vector<Endpoint> endpoints,
+                look_up(host, port, deadline, stop, resolve));
+  int error = EHOSTUNREACH;  // where there is none
+  for (const Endpoint& each : endpoints) {
     UniqueFd socket;
-    error = connect_to(*each, deadline, stop, socket);
+    error = connect_to(each, deadline, stop, socket);
     if (error == ECANCELED) break;
     if (error != 0) continue;
     const int on = 1;

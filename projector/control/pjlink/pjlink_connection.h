@@ -7,6 +7,7 @@
 #include "base/clock.h"
 #include "base/result.h"
 #include "base/unique_handle.h"
+#include "projector/control/pjlink/name_lookup.h"
 
 namespace veneer::projector::pjlink {
 
@@ -14,12 +15,12 @@ namespace veneer::projector::pjlink {
 class Connection {
  public:
   /// @param stop  becomes readable when every wait shall end with kCancelled; borrowed, must
-  ///              outlive the connection. The look-up of a name is not a wait of ours.
-  /// Errors: kNotFound (no such name, nobody listens, no way there, no answer), kIo, kCancelled.
-  [[nodiscard]] static Result<Connection> open(const std::string& host,
-                                               int port,
-                                               Time deadline,
-                                               int stop);
+  ///              outlive the connection.
+  /// @param resolve  for a host that is a name; see look_up().
+  /// Errors: kNotFound (no such name, nobody listens, no way there, no answer), kIo, kCancelled,
+  /// kUnavailable (the look-up of names hangs).
+  [[nodiscard]] static Result<Connection> open(
+      const std::string& host, int port, Time deadline, int stop, const Resolve& resolve);
   /// Errors: kTimeout, kDisconnected, kIo, kCancelled; all final.
   [[nodiscard]] Status write(std::string_view bytes, Time deadline);
   /// The next line, without its CR (nor the LF that some devices add to it). Errors: kTimeout and
