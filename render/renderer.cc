@@ -3,6 +3,7 @@
 
 #include <time.h>
 
+#include <algorithm>
 #include <chrono>
 #include <optional>
 #include <utility>
@@ -177,6 +178,9 @@ class GlRenderer final : public Renderer {
     glPixelStorei(GL_PACK_ALIGNMENT, 2);
     glPixelStorei(GL_PACK_ROW_LENGTH, static_cast<GLint>(pixels.stride()));
     glReadPixels(0, 0, width_, height_, format, type, pixels.data());
+    // What a lost GPU leaves in a picture may be anything: nothing of it goes further.
+    if (context_.lost())
+      for (int y = 0; y < height_; ++y) std::ranges::fill(pixels.row(y), black_pixel<Pixel>());
   }
 
   EglContext context_;  // first, so that it goes last

@@ -112,6 +112,7 @@ class Renderer {
   /// profile. Software drivers leave no fence in it: finish() comes before it is shown.
   virtual void draw_to_scanout(std::size_t buffer) = 0;
   /// Waits for the last frame and reads it: codes of ProjectorProfile::bits bits, first row on top.
+  /// Of a GPU that was reset, all is 0.
   virtual void read_codes(ImageView<Rgb16> codes) = 0;
   /// The same for the target luminance before compensation, XYZ in cd/m^2 (0 outside the object).
   virtual void read_target(ImageView<Rgb32f> target_xyz) = 0;

@@ -76,7 +76,7 @@ class MovingTracker final : public tracking::Tracker {
 };
 
 /// Remembers what it was asked to draw, the last hundred thousand.
-class FakeRenderer final : public render::Renderer {
+class FakeRenderer : public render::Renderer {
  public:
   explicit FakeRenderer(Stagehand& hand, int mark = 0) : hand_(hand), mark_(mark) {
     ++hand_.alive;
@@ -122,7 +122,7 @@ class FakeRenderer final : public render::Renderer {
   bool lost_ = false;
 };
 
-class FakeOutput final : public projector::Output {
+class FakeOutput : public projector::Output {
  public:
   explicit FakeOutput(Stagehand& hand) : hand_(hand) {}
   ~FakeOutput() override { hand_.dark = true; }

@@ -161,4 +161,45 @@ Duration recovery_limit(const InjectionKind& kind) {
   return kind.fault ? service::recovery_time_of(*kind.fault) : Duration(std::chrono::seconds(1));
 }
 
+std::optional<Duration> named_after(const InjectionKind& kind) {
+  using namespace std::chrono_literals;
+  switch (kind.injection) {
+    // A second without a pose, and half of one until a frame has seen it.
+    case Injection::kTrackerSilent:
+    case Injection::kTrackerNan:
+    case Injection::kTrackerFuture:
+    case Injection::kTrackerPast:
+      return 1500ms;
+    // Some frames, on a busy machine.
+    case Injection::kTrackerGone:
+    case Injection::kOutputUnavailable:
+    case Injection::kOutputIo:
+    case Injection::kOutputRefusesToOpen:
+    case Injection::kGpuRefusesToOpen:
+      return 500ms;
+    case Injection::kGpuLost:
+    case Injection::kGpuLostInAFrame:
+      return 200ms;
+    // Looked at every two seconds.
+    case Injection::kMemoryShort:
+      return 3s;
+    // Named by the call that finds it.
+    case Injection::kMaterialCut:
+    case Injection::kMaterialGarbage:
+    case Injection::kMaterialGone:
+    case Injection::kProfileDamaged:
+    case Injection::kProfileGone:
+    case Injection::kSceneWrong:
+    case Injection::kSceneGone:
+    case Injection::kConfigurationWrong:
+    case Injection::kDiskFull:
+    case Injection::kDiskGone:
+    case Injection::kClockJump:
+    case Injection::kSuspended:
+      return Duration{};
+    default:
+      return {};
+  }
+}
+
 }  // namespace veneer::soak

@@ -8,6 +8,7 @@
 #include <span>
 #include <string_view>
 
+#include "base/clock.h"
 #include "service/status.h"
 
 namespace veneer::soak {
@@ -90,6 +91,10 @@ struct InjectionKind {
 /// After its cause has gone. Where nothing is to be listed: the time in which frames are shown
 /// again.
 [[nodiscard]] Duration recovery_limit(const InjectionKind& kind);
+/// How long it has to last for the daemon to name it; none for what it may take without a word:
+/// poses that are dropped one by one, frames that are late for a while, a projector, which is asked
+/// ever more seldom after a silence.
+[[nodiscard]] std::optional<Duration> named_after(const InjectionKind& kind);
 
 /// What is wrong at the moment. Set by whoever injects, read by the devices, in any thread.
 class Switches {

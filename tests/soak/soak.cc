@@ -244,8 +244,9 @@ const InjectionKind* Soak::choose() {
 void Soak::begin(const InjectionKind& kind) {
   Active active;
   active.kind = &kind;
-  active.until = now() + from_seconds(kind.shortest_s +
-                                      (kind.longest_s - kind.shortest_s) * random_.uniform());
+  active.begun = now();
+  active.until = active.begun + from_seconds(kind.shortest_s + (kind.longest_s - kind.shortest_s) *
+                                                                   random_.uniform());
   ++result_.injected;
   ++result_.tallies[static_cast<std::size_t>(kind.injection)].injected;
   switches_.set(kind.injection, true);
@@ -262,6 +263,9 @@ void Soak::begin(const InjectionKind& kind) {
 
 void Soak::end(Active& active) {
   const Injection injection = active.kind->injection;
+  const std::optional<Duration> limit = named_after(*active.kind);
+  if (limit && now() - active.begun >= *limit)
+    ++result_.tallies[static_cast<std::size_t>(injection)].lasting;
   switches_.set(injection, false);
   if (injection == Injection::kGpuRefusesToOpen) switches_.set(Injection::kGpuLost, false);
   if (active.kind->group == Group::kFiles) {

@@ -36,6 +36,7 @@ struct Tally {
   std::uint64_t injected = 0;
   std::uint64_t met = 0;        ///< how often a device failed because of it
   std::uint64_t listed = 0;     ///< injections that the daemon named among its faults
+  std::uint64_t lasting = 0;    ///< those that lasted long enough to be named (named_after)
   std::uint64_t recovered = 0;  ///< within its time
   std::uint64_t untold = 0;  ///< nobody can say: the machine was busy with other things all along
   Duration longest{};        ///< recovery
@@ -73,6 +74,7 @@ class Soak {
  private:
   struct Active {
     const InjectionKind* kind = nullptr;
+    Time begun;
     Time until;                 ///< the cause goes
     std::optional<Time> ended;  ///< it has gone
     std::uint64_t frames_at_end = 0;
