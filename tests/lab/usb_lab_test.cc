@@ -4,7 +4,6 @@
 
 #include <chrono>
 #include <cstdlib>
-#include <filesystem>
 #include <functional>
 #include <memory>
 #include <thread>
@@ -13,6 +12,7 @@
 #include "projector/control/dlpc350/dlpc350.h"
 #include "tests/lab/usb_devices.h"
 #include "tracking/drivers.h"
+#include "tracking/testing/holdings.h"
 
 // Drivers over the kernel's own USB stack: the real hidapi, hidraw, libusb, usbfs and udev, on
 // devices that tests/lab/ plays. Runs as root in the kernel lab (./dev lab usb). Times are real and
@@ -23,13 +23,6 @@ namespace {
 using namespace std::chrono_literals;
 using lab::HidGadget;
 using ::testing::HasSubstr;
-
-std::size_t count_descriptors() {
-  std::size_t count = 0;
-  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator("/proc/self/fd"))
-    ++count;
-  return count;
-}
 
 /// udev has made what it makes of what was plugged in.
 void settle() { EXPECT_EQ(std::system("udevadm settle --timeout=20"), 0); }
@@ -290,7 +283,7 @@ TEST_F(LibertyLab, ItsPosesArriveInMetres) {
 TEST_F(LibertyLab, UnplugIsToldAndReplugTakesItUpAgainAndNothingLeaks) {
   plug_in();
   ASSERT_TRUE(tracks()) << tracker_->status().detail;
-  const std::size_t descriptors = count_descriptors();
+  const std::size_t descriptors = tracking::count_descriptors();
   for (int i = 2; i < 6; ++i) {
     ASSERT_TRUE(device_.unplug());
     ASSERT_TRUE(becomes(tracking::TrackerState::kAbsent)) << tracker_->status().detail;
@@ -298,7 +291,7 @@ TEST_F(LibertyLab, UnplugIsToldAndReplugTakesItUpAgainAndNothingLeaks) {
     ASSERT_TRUE(tracks()) << tracker_->status().detail;
     EXPECT_EQ(device_.starts(), i) << "told again what to send, once";
   }
-  EXPECT_EQ(count_descriptors(), descriptors);
+  EXPECT_EQ(tracking::count_descriptors(), descriptors);
 }
 
 TEST_F(LibertyLab, UnplugAtAnyMomentOfTheStartIsSurvived) {

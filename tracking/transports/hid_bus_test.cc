@@ -5,10 +5,10 @@
 #include <atomic>
 #include <cerrno>
 #include <chrono>
-#include <filesystem>
 #include <mutex>
 #include <thread>
 
+#include "tracking/testing/holdings.h"
 #include "tracking/testing/mock_hidraw.h"
 #include "tracking/transports/hid.h"
 
@@ -33,13 +33,6 @@ mock::Bytes report_of(std::size_t size, int first) {
   for (std::size_t i = 0; i < size; ++i)
     bytes[i] = static_cast<std::byte>(first + static_cast<int>(i));
   return bytes;
-}
-
-std::size_t count_descriptors() {
-  std::size_t count = 0;
-  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator("/proc/self/fd"))
-    ++count;
-  return count;
 }
 
 class HidBus : public ::testing::Test {
