@@ -16,6 +16,7 @@
 #include "base/random.h"
 #include "base/statistics.h"
 #include "btf/mapped_material.h"
+#include "btf/spread_texels.h"
 
 namespace veneer::btf {
 namespace {
@@ -24,7 +25,7 @@ namespace {
 constexpr float kEncodingExponent = 1.0F / 2.2F;
 // Enough colour differences for a mean and a percentile that are steady to about half a percent.
 constexpr std::int64_t kColourSamples = 200'000;
-constexpr std::int64_t kDrawnTexels = 1024;
+constexpr int kDrawnTexels = 1024;
 constexpr std::int64_t kDrawnSamples = 200'000;
 // Texels are summed in this many groups, each in order, so that rounding does not depend on
 // threads.
@@ -187,33 +188,21 @@ ImageError image_error(const Sums& sums, const ComparedPairs& pairs, const Sampl
           sums.texel_max / (3.0 * weight)};
 }
 
-// The i-th of `count` texels spread over the sample: all in order where it has no more, else
-// Roberts' two-dimensional sequence (2018, "The Unreasonable Effectiveness of Quasirandom
-// Sequences", alpha of the plastic number), which follows no row or column of a weave.
-int spread_texel(std::int64_t i, std::int64_t count, const SampleSetInfo& info) {
-  if (count == info.texel_count()) return static_cast<int>(i);
-  const auto fraction = [i](double alpha) {
-    return std::fmod(static_cast<double>(i + 1) * alpha, 1.0);
-  };
-  const int x = static_cast<int>(fraction(0.7548776662466927) * info.width);
-  const int y = static_cast<int>(fraction(0.5698402909980532) * info.height);
-  return y * info.width + x;
-}
-
 double drawn_epsilon(const SampleSet& set,
                      const Material& material,
                      const ComparedPairs& compared,
                      const WeightedDraw& draw,
                      Progress& progress) {
   const SampleSetInfo& info = set.info();
-  const std::int64_t texels = std::min<std::int64_t>(kDrawnTexels, info.texel_count());
+  const std::vector<int> chosen = spread_texels(info, kDrawnTexels);
+  const std::int64_t texels = std::ssize(chosen);
   const std::int64_t per_texel = std::max<std::int64_t>(kDrawnSamples / texels, 1);
   std::vector<double> means(static_cast<std::size_t>(texels));
   progress.start("comparing as drawn", texels);
   parallel_for(texels, 1, [&](std::int64_t begin, std::int64_t end) {
     std::vector<float> rgb(static_cast<std::size_t>(info.pair_count()) * 3);
     for (std::int64_t i = begin; i < end; ++i) {
-      const int texel = spread_texel(i, texels, info);
+      const int texel = chosen[static_cast<std::size_t>(i)];
       set.rgb(texel, Part::kTotal, rgb);
       const std::vector<int> pairs = choose_pairs(draw, per_texel, static_cast<std::uint64_t>(i));
       double sum = 0.0;

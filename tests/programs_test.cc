@@ -8,7 +8,9 @@
 #include <array>
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <fstream>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -22,6 +24,30 @@ namespace veneer {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// An empty folder that programs take for their temporary files while this lives.
+class Scratch {
+ public:
+  explicit Scratch(fs::path path) : path_(std::move(path)) {
+    if (const char* before = std::getenv("TMPDIR")) before_ = before;
+    fs::create_directory(path_);
+    ::setenv("TMPDIR", path_.c_str(), 1);
+  }
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  ~Scratch() {
+    if (before_) {
+      ::setenv("TMPDIR", before_->c_str(), 1);
+    } else {
+      ::unsetenv("TMPDIR");
+    }
+  }
+  [[nodiscard]] const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+  std::optional<std::string> before_;
+};
 
 /// A tiny polarised sample set, a material fitted to it, a profile and a run's configuration, made
 /// once by the programs themselves.
@@ -273,6 +299,43 @@ TEST_F(ProgramsTest, CompareGivesThePublishedTablesOfASet) {
   EXPECT_EQ(tables.find("### Table 3"), std::string::npos) << tables;
   EXPECT_TRUE(fails(
       run("veneer compare " + text("cloth.btfset") + " --models granite"), 2, "there is no model"));
+}
+
+TEST_F(ProgramsTest, CompareSaysHowFarModelsAreOffWhereNoFitSaw) {
+  const Scratch scratch(at("scratch"));
+  const std::string compare = "veneer compare " + text("cloth.btfset") + " --tables 2 --models ";
+  const Outcome outcome = run(compare + "lpca,phong --held-out 60 --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("2 of 2: phong, without the views beyond 60 degrees"),
+            std::string::npos)
+      << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(json.at("held_out_beyond_deg"), 60.0);
+  ASSERT_EQ(json.at("models").size(), 2U);
+  for (const auto& model : json.at("models")) {
+    const auto& held_out = model.at("held_out");
+    EXPECT_EQ(held_out.at("texels"), 64);
+    EXPECT_EQ(
+        held_out.at("beyond").at("views").get<int>() + held_out.at("within").at("views").get<int>(),
+        25);
+    EXPECT_GT(held_out.at("beyond").at("epsilon"), 0.0);
+  }
+  // What holds nearly all of the fitted views holds less of the others.
+  const auto& lpca = json.at("models").at(0).at("held_out");
+  EXPECT_GT(lpca.at("beyond").at("epsilon"), lpca.at("within").at("epsilon"));
+  EXPECT_TRUE(fs::is_empty(scratch.path())) << "the set without grazing views is still there";
+
+  // Nor does a fit that fails leave anything.
+  EXPECT_TRUE(fails(run(compare + "lpca:9999 --held-out 60"), 2, "components"));
+  EXPECT_TRUE(fs::is_empty(scratch.path()));
+}
+
+TEST_F(ProgramsTest, CompareRefusesAnglesThatHoldOutNothing) {
+  const std::string compare =
+      "veneer compare " + text("cloth.btfset") + " --tables 2 --models phong --held-out ";
+  EXPECT_TRUE(fails(run(compare + "80"), 2, "the furthest from the normal is at 75"));
+  EXPECT_TRUE(fails(run(compare + "91"), 2, "--held-out"));
+  EXPECT_TRUE(fails(run(compare + "nan"), 2, "between 0 and 90 degrees"));
 }
 
 TEST_F(ProgramsTest, AGovernorIsNotTimedWhereNothingCanBeSeen) {

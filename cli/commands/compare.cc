@@ -5,11 +5,15 @@
 #include <array>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <iterator>
+#include <numbers>
+#include <optional>
 
 #include "base/exit_code.h"
 #include "base/files.h"
 #include "btf/evaluation.h"
+#include "btf/held_out.h"
 #include "cli/commands/commands.h"
 #include "cli/comparison/tables.h"
 
@@ -33,12 +37,16 @@ const std::array kEntries{Entry{"lafortune", ""},
                           Entry{"dichromatic-lpca", "4+4"},
                           Entry{"layered", ""}};
 
+// That Table 4 is over, every pair of each; as many as `evaluate` compares as drawn.
+constexpr int kHeldOutTexels = 1024;
+
 struct CompareOptions {
   std::filesystem::path set;
   std::filesystem::path out;
-  std::vector<std::string> models;  // empty: kEntries
-  std::string material;             // empty: guessed from the set's name
-  std::vector<int> tables;          // empty: all
+  std::vector<std::string> models;     // empty: kEntries
+  std::string material;                // empty: guessed from the set's name
+  std::vector<int> tables;             // empty: all
+  std::optional<double> held_out_deg;  // views beyond are held out for Table 4
   std::uint64_t seed = 1;
   render::RenderBenchOptions bench;
   std::string size = "1024x768";
@@ -79,10 +87,15 @@ Result<std::vector<Entry>> entries(const std::vector<std::string>& names, bool p
   return chosen;
 }
 
-Result<std::shared_ptr<const btf::Material>> fit(const btf::SampleSet& set,
-                                                 const Entry& entry,
-                                                 std::uint64_t seed,
-                                                 Progress& progress) {
+struct Fitted {
+  std::shared_ptr<const btf::Material> material;
+  double seconds = 0;
+};
+
+Result<Fitted> fit(const btf::SampleSet& set,
+                   const Entry& entry,
+                   std::uint64_t seed,
+                   Progress& progress) {
   VENEER_ASSIGN(const btf::Model* model, btf::find_model(entry.model));
   if (model->terms == 0 && !entry.components.empty())
     return fail(Errc::kInvalidOption, "comparing {}: it has no components", entry.model);
@@ -91,9 +104,35 @@ Result<std::shared_ptr<const btf::Material>> fit(const btf::SampleSet& set,
   options.lobes = kPublishedLobes;
   options.seed = seed;
   if (!entry.components.empty()) options.components = entry.components;
+  const auto begin = std::chrono::steady_clock::now();
   VENEER_ASSIGN(std::unique_ptr<btf::Material> material, model->fit(set, options, progress));
-  return std::shared_ptr<const btf::Material>(std::move(material));
+  const auto end = std::chrono::steady_clock::now();
+  return Fitted{std::move(material), std::chrono::duration<double>(end - begin).count()};
 }
+
+/// A set without some of its views, for as long as it is needed.
+class NearSet {
+ public:
+  static Result<NearSet> of(const btf::SampleSet& set, double most_theta_rad) {
+    std::error_code error;
+    const std::filesystem::path temporary = std::filesystem::temp_directory_path(error);
+    if (error)
+      return fail(Errc::kIo,
+                  "holding out views: no folder for temporary files: {}; set TMPDIR to one",
+                  error.message());
+    VENEER_ASSIGN(StagedFolder folder, StagedFolder::create(temporary / "veneer-compare"));
+    VENEER_ASSIGN(btf::SampleSet near,
+                  btf::without_views_beyond(set, most_theta_rad, folder.path() / "near.btfset"));
+    return NearSet{std::move(folder), std::move(near)};
+  }
+  [[nodiscard]] const btf::SampleSet& set() const { return set_; }
+
+ private:
+  NearSet(StagedFolder folder, btf::SampleSet set)
+      : folder_(std::move(folder)), set_(std::move(set)) {}
+  StagedFolder folder_;  // never committed, so that nothing is left of it
+  btf::SampleSet set_;
+};
 
 /// Times all materials in one run. A machine without GL leaves a remark in place of times.
 Status time_drawing(const CompareOptions& options,
@@ -141,17 +180,25 @@ Result<Comparison> compare(const CompareOptions& options, CommandLine& line) {
   comparison.table3 = wanted(3);
   if (comparison.table1) comparison.mean_brdf = mean_brdf_errors(set);
 
+  // Before minutes of fitting: it refuses an angle that does not divide the views.
+  std::optional<NearSet> near;
+  double most_theta_rad = 0.0;
+  if (options.held_out_deg) {
+    most_theta_rad = *options.held_out_deg * std::numbers::pi / 180.0;
+    VENEER_ASSIGN(NearSet made, NearSet::of(set, most_theta_rad));
+    near.emplace(std::move(made));
+    comparison.most_theta_deg = options.held_out_deg;
+  }
+
   std::vector<std::shared_ptr<const btf::Material>> materials;
   for (const Entry& entry : chosen) {
     ComparedModel& model = comparison.models.emplace_back();
     model.name = entry.model + (entry.components.empty() ? "" : " " + entry.components);
     model.published = find_published_model(entry.model, entry.components);
     line.note(fmt::format("{} of {}: {}", comparison.models.size(), chosen.size(), model.name));
-    const auto begin = std::chrono::steady_clock::now();
-    VENEER_ASSIGN(const std::shared_ptr<const btf::Material> material,
-                  fit(set, entry, options.seed, line.progress()));
-    model.fit_seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    VENEER_ASSIGN(const Fitted fitted, fit(set, entry, options.seed, line.progress()));
+    const std::shared_ptr<const btf::Material>& material = fitted.material;
+    model.fit_seconds = fitted.seconds;
     if (comparison.table1) {
       VENEER_ASSIGN(const btf::Evaluation e, btf::evaluate(set, *material, line.progress()));
       model.errors = {e.encoded.epsilon_avg, e.encoded.texel_min, e.encoded.texel_max};
@@ -169,6 +216,18 @@ Result<Comparison> compare(const CompareOptions& options, CommandLine& line) {
       } else {
         return tl::unexpected(cost.error());
       }
+    }
+    if (near) {
+      line.note(fmt::format("{} of {}: {}, without the views beyond {} degrees",
+                            comparison.models.size(),
+                            chosen.size(),
+                            model.name,
+                            *options.held_out_deg));
+      VENEER_ASSIGN(const Fitted held_out, fit(near->set(), entry, options.seed, line.progress()));
+      VENEER_ASSIGN(const btf::HeldOutErrors errors,
+                    btf::held_out_errors(
+                        set, *held_out.material, most_theta_rad, kHeldOutTexels, line.progress()));
+      model.held_out = {held_out.seconds, errors};
     }
     materials.push_back(material);
   }
@@ -192,6 +251,11 @@ Result<int> run_compare(CommandLine& line) {
       ->delimiter(',')
       ->expected(0, 3)
       ->check(CLI::Range(1, 3));
+  app.add_option("--held-out",
+                 options.held_out_deg,
+                 "Fit every model once more without the views beyond this many degrees from the "
+                 "normal, such as 60, and say in Table 4 how far each is off there")
+      ->check(CLI::Range(0.0, 90.0));
   app.add_option("--models",
                  options.models,
                  "Only these models: NAME or NAME:COMPONENTS, such as lpca,texel-colours:3+1")

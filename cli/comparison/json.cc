@@ -13,6 +13,17 @@ Json errors_json(const Errors& errors) {
   return {{"avg", errors.avg}, {"min", errors.min}, {"max", errors.max}};
 }
 
+Json views_json(const btf::ViewsError& error) {
+  return {{"views", error.views}, {"epsilon", error.epsilon}, {"rmse_linear", error.rmse}};
+}
+
+Json held_out_json(const HeldOutFit& fit) {
+  return {{"fit_seconds", fit.fit_seconds},
+          {"texels", fit.errors.texels},
+          {"beyond", views_json(fit.errors.beyond)},
+          {"within", views_json(fit.errors.within)}};
+}
+
 Json model_json(const Comparison& comparison, const ComparedModel& model) {
   Json json{{"name", model.name}, {"fit_seconds", model.fit_seconds}};
   if (model.errors) json["epsilon"] = errors_json(*model.errors);
@@ -28,6 +39,7 @@ Json model_json(const Comparison& comparison, const ComparedModel& model) {
     json["ms_p95"] = model.timing->ms_p95;
     json["ratio"] = model.timing->ratio;
   }
+  if (model.held_out) json["held_out"] = held_out_json(*model.held_out);
   if (const PublishedModel* paper = model.published) {
     Json& published = json["published"] = {
         {"label", paper->label},
@@ -58,6 +70,7 @@ nlohmann::ordered_json to_json(const Comparison& comparison) {
       comparison.material == nullptr ? Json() : Json(comparison.material->name);
   json["epsilon_domain"] = "samples cut to [0, 1], exponent 1/2.2; over texels";
   if (comparison.mean_brdf) json["mean_brdf_epsilon"] = errors_json(*comparison.mean_brdf);
+  if (comparison.most_theta_deg) json["held_out_beyond_deg"] = *comparison.most_theta_deg;
   json["models"] = Json::array();
   for (const ComparedModel& model : comparison.models)
     json["models"].push_back(model_json(comparison, model));

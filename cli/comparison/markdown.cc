@@ -196,6 +196,38 @@ std::string table3(const Comparison& comparison) {
   return text + "\n" + table.text();
 }
 
+std::string table4(const Comparison& comparison, double most_theta_deg) {
+  Table table({"model",
+               "published as",
+               "epsilon beyond",
+               "epsilon within",
+               "linear rmse beyond",
+               "linear rmse within",
+               "fit, s"});
+  btf::HeldOutErrors counts;  // of views and texels, the same for all models
+  for (const ComparedModel& model : comparison.models) {
+    if (!model.held_out) continue;
+    counts = model.held_out->errors;
+    const btf::ViewsError& beyond = counts.beyond;
+    const btf::ViewsError& within = counts.within;
+    Row row{model.name, label_of(model)};
+    append(row, "{:.4f}", beyond.epsilon, within.epsilon, beyond.rmse, within.rmse);
+    row.push_back(fmt::format("{:.1f}", model.held_out->fit_seconds));
+    table.add(row);
+  }
+  return title(4, fmt::format("views beyond {} degrees, which no fit saw", most_theta_deg)) +
+         fmt::format(
+             "Every model is fitted once more, on the {} views up to {} degrees from the normal. "
+             "Errors are of these (within) and of the {} views that the fit did not see (beyond), "
+             "over {} texels and all lights, as the shader draws; epsilon as in Table 1, rmse in "
+             "linear light, both of values cut to [0, 1].\n\n",
+             counts.within.views,
+             most_theta_deg,
+             counts.beyond.views,
+             counts.texels) +
+         table.text();
+}
+
 }  // namespace
 
 std::string to_markdown(const Comparison& comparison) {
@@ -208,6 +240,7 @@ std::string to_markdown(const Comparison& comparison) {
   if (comparison.table1) text += table1(comparison);
   if (comparison.table2) text += table2(comparison);
   if (comparison.table3) text += table3(comparison);
+  if (comparison.most_theta_deg) text += table4(comparison, *comparison.most_theta_deg);
   return text;
 }
 

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "btf/held_out.h"
 #include "btf/sample_set.h"
 #include "cli/comparison/published.h"
 #include "cli/comparison/shader_cost.h"
@@ -26,6 +27,12 @@ struct TexelErrors {
 /// What is left where every texel is replaced by the mean of all: how much texture a set has.
 [[nodiscard]] TexelErrors mean_brdf_errors(const btf::SampleSet& set);
 
+/// A second fit, of the views up to an angle only.
+struct HeldOutFit {
+  double fit_seconds = 0;
+  btf::HeldOutErrors errors;
+};
+
 /// One line of the tables.
 struct ComparedModel {
   std::string name;                           ///< such as "texel-colours 3+1"
@@ -37,6 +44,7 @@ struct ComparedModel {
   int fetches = 0;
   std::optional<ShaderCost> cost{};
   std::optional<render::RenderTiming> timing{};
+  std::optional<HeldOutFit> held_out{};
 };
 
 struct Comparison {
@@ -49,6 +57,8 @@ struct Comparison {
   bool table1 = true;
   bool table2 = true;
   bool table3 = true;
+  /// Views further from the normal are held out for Table 4; empty: there is no such table.
+  std::optional<double> most_theta_deg{};
   std::optional<TexelErrors> mean_brdf{};
   std::vector<ComparedModel> models;
   std::string no_cost;       ///< why there is no count of instructions; empty where there is

@@ -45,6 +45,17 @@ Comparison as_published(const PublishedMaterial& material) {
   return comparison;
 }
 
+/// Every model's error beyond is `factor` times that within, which grows with its number.
+void hold_out(Comparison& comparison, double most_theta_deg, double factor) {
+  comparison.most_theta_deg = most_theta_deg;
+  double epsilon = 0.0;
+  for (ComparedModel& model : comparison.models) {
+    epsilon += 0.01;
+    model.held_out = HeldOutFit{
+        1.25, {{57, epsilon / 2, epsilon}, {24, factor * epsilon / 2, factor * epsilon}, 1024}};
+  }
+}
+
 const PublishedMaterial& wallpaper() { return *find_published_material("wallpaper"); }
 
 TEST(Published, FormulasGiveTable2AtThePapersSize) {
@@ -123,6 +134,7 @@ TEST(Markdown, EveryRowOfATableHasAsManyCells) {
   Comparison comparison = as_published(wallpaper());
   comparison.models.push_back({.name = "phong", .errors = TexelErrors{.1, .05, .2}});
   comparison.mean_brdf = TexelErrors{.3, .2, .4};
+  hold_out(comparison, 60.0, 3.0);
   for (const PublishedMaterial* material :
        {&wallpaper(), static_cast<const PublishedMaterial*>(nullptr)}) {
     comparison.material = material;
@@ -142,8 +154,8 @@ TEST(Markdown, EveryRowOfATableHasAsManyCells) {
       cells = bars;
       ++rows;
     }
-    // Four tables with a header of two lines: 7 + 8 claims + 6 + 6.
-    EXPECT_EQ(rows, 4 * 2 + 7 + 8 + 6 + 6);
+    // Five tables with a header of two lines: 7 + 8 claims + 6 + 6 + 6.
+    EXPECT_EQ(rows, 5 * 2 + 7 + 8 + 6 + 6 + 6);
     EXPECT_EQ(text.find("avg, paper") != std::string::npos, material != nullptr);
   }
 }
@@ -173,6 +185,42 @@ TEST(Json, HoldsOursBesideThePapers) {
   EXPECT_EQ(pca.at("values_per_texel"), 3888);
   EXPECT_EQ(pca.at("alu_is_complete"), false);
   EXPECT_FALSE(json.at("models").at(4).contains("alu"));
+}
+
+TEST(HeldOutViews, HaveATableOnlyWhereTheyWereAskedFor) {
+  Comparison comparison = as_published(wallpaper());
+  EXPECT_THAT(to_markdown(comparison), Not(HasSubstr("Table 4")));
+  EXPECT_FALSE(to_json(comparison).contains("held_out_beyond_deg"));
+  EXPECT_FALSE(to_json(comparison).at("models").at(0).contains("held_out"));
+  hold_out(comparison, 60.0, 3.0);
+  comparison.table1 = comparison.table2 = comparison.table3 = false;
+  const std::string text = to_markdown(comparison);
+  EXPECT_THAT(text, HasSubstr("### Table 4: views beyond 60 degrees, which no fit saw"));
+  EXPECT_THAT(text, HasSubstr("on the 57 views up to 60 degrees"));
+  EXPECT_THAT(text, HasSubstr("of the 24 views that the fit did not see"));
+  EXPECT_THAT(text, HasSubstr("over 1024 texels"));
+  EXPECT_THAT(text, Not(HasSubstr("Table 1:")));
+}
+
+TEST(HeldOutViews, StandBesideTheFittedOnesForEveryModel) {
+  Comparison comparison = as_published(wallpaper());
+  hold_out(comparison, 52.5, 3.0);
+  const std::string text = to_markdown(comparison);
+  EXPECT_THAT(text, HasSubstr("views beyond 52.5 degrees"));
+  EXPECT_THAT(text, HasSubstr("| lafortune | LAF | 0.0300 | 0.0100 | 0.0150 | 0.0050 | 1.2 |"));
+  EXPECT_THAT(text, HasSubstr("| lpca | LPCA | 0.1500 | 0.0500 | 0.0750 | 0.0250 | 1.2 |"));
+  const nlohmann::ordered_json json = to_json(comparison);
+  EXPECT_EQ(json.at("held_out_beyond_deg"), 52.5);
+  for (const auto& model : json.at("models")) {
+    const auto& held_out = model.at("held_out");
+    EXPECT_EQ(held_out.at("texels"), 1024);
+    EXPECT_EQ(held_out.at("within").at("views"), 57);
+    EXPECT_EQ(held_out.at("beyond").at("views"), 24);
+    for (const char* figure : {"epsilon", "rmse_linear"})
+      EXPECT_DOUBLE_EQ(held_out.at("beyond").at(figure).get<double>(),
+                       3.0 * held_out.at("within").at(figure).get<double>())
+          << model.at("name");
+  }
 }
 
 btf::SampleSet write_set(const std::filesystem::path& path, float (*value)(int texel)) {

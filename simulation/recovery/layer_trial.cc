@@ -7,18 +7,19 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "base/parallel.h"
 #include "btf/evaluation.h"
+#include "btf/held_out.h"
 #include "btf/material.h"
 #include "btf/models/fitted_pairs.h"
 #include "btf/models/layered/layer_fit.h"
 #include "btf/models/layered/layered.h"
 #include "btf/sample_set.h"
+#include "btf/spread_texels.h"
 #include "simulation/materials/layer_truth.h"
 #include "simulation/materials/synthesize.h"
 #include "simulation/materials/tracer.h"
@@ -36,14 +37,6 @@ constexpr std::uint64_t kOtherPaths = 0x5EED;
 
 double cut(double sample) { return std::clamp(sample, 0.0, 1.0); }
 
-// Texels spread over a set, of a stride that shares no factor with its width.
-std::vector<int> some_texels(int count, int wanted) {
-  std::vector<int> texels;
-  const int stride = std::max(1, count / wanted) | 1;
-  for (int texel = 0; texel < count; texel += stride) texels.push_back(texel);
-  return texels;
-}
-
 double rms(const std::vector<double>& squares, double count) {
   double sum = 0.0;
   for (const double square : squares) sum += square;
@@ -53,7 +46,7 @@ double rms(const std::vector<double>& squares, double count) {
 double noise_of(const btf::SampleSet& set, const BodyField& field, SynthesisOptions options) {
   options.seed += kOtherPaths;
   const Tracer tracer(field, options);
-  const std::vector<int> texels = some_texels(set.info().texel_count(), kNoiseTexels);
+  const std::vector<int> texels = btf::spread_texels(set.info(), kNoiseTexels);
   const auto pairs = static_cast<std::size_t>(set.info().pair_count());
   std::vector<double> squares(texels.size(), 0.0);
   parallel_for(std::ssize(texels), 1, [&](std::int64_t begin, std::int64_t end) {
@@ -103,63 +96,6 @@ Result<ModelError> best_clustered(const btf::SampleSet& set,
     }
   }
   return *best;
-}
-
-bool is_fitted(const btf::Direction& view) {
-  return std::acos(std::min(1.0, view.z())) <= kMostFittedTheta_rad + 1e-9;
-}
-
-// The views of a set up to 60 degrees, as a set.
-Result<btf::SampleSet> without_grazing_views(const btf::SampleSet& set,
-                                             const std::filesystem::path& path) {
-  btf::SampleSetInfo info = set.info();
-  std::erase_if(info.views, [](const btf::Direction& view) { return !is_fitted(view); });
-  if (info.views.empty() || info.views.size() == set.info().views.size())
-    return fail(Errc::kInvalidOption,
-                "holding out the views beyond 60 degrees: {} of {} views are nearer to the normal",
-                info.views.size(),
-                set.info().views.size());
-  VENEER_ASSIGN(btf::SampleSetWriter writer, btf::SampleSetWriter::create(path, info));
-  const std::size_t row = info.lights.size() * static_cast<std::size_t>(info.channel_count());
-  for (int texel = 0; texel < info.texel_count(); ++texel) {
-    const auto from = set.stored(texel);
-    auto to = writer.texel(texel).begin();
-    for (std::size_t view = 0; view < set.info().views.size(); ++view)
-      if (is_fitted(set.info().views[view]))
-        to = std::ranges::copy(from.subspan(view * row, row), to).out;
-  }
-  VENEER_TRY(writer.finish());
-  return btf::SampleSet::open(path);
-}
-
-// Of the views that were held out, as they are drawn.
-double grazing_rmse(const btf::SampleSet& set, const btf::Material& material) {
-  const std::vector<int> texels = some_texels(set.info().texel_count(), kGrazingTexels);
-  const auto& views = set.info().views;
-  const auto& lights = set.info().lights;
-  std::vector<double> squares(texels.size(), 0.0);
-  parallel_for(std::ssize(texels), 1, [&](std::int64_t begin, std::int64_t end) {
-    std::vector<float> rgb(static_cast<std::size_t>(set.info().pair_count()) * 3);
-    for (std::int64_t i = begin; i < end; ++i) {
-      const auto at = static_cast<std::size_t>(i);
-      set.rgb(texels[at], btf::Part::kTotal, rgb);
-      for (std::size_t view = 0; view < views.size(); ++view) {
-        if (is_fitted(views[view])) continue;
-        for (std::size_t light = 0; light < lights.size(); ++light) {
-          const Eigen::Vector3d drawn = material.radiance(texels[at], views[view], lights[light]);
-          for (std::size_t c = 0; c < 3; ++c) {
-            const double step =
-                cut(drawn[static_cast<int>(c)]) - cut(rgb[(view * lights.size() + light) * 3 + c]);
-            squares[at] += step * step;
-          }
-        }
-      }
-    }
-  });
-  const auto held_out = std::ranges::count_if(views, std::not_fn(&is_fitted));
-  return rms(
-      squares,
-      static_cast<double>(texels.size() * lights.size() * 3) * static_cast<double>(held_out));
 }
 
 // Fits layers and keeps the stack in view, which a Material does not show.
@@ -216,17 +152,23 @@ Result<LayerTrial> try_layers(const BodyMaterial& material,
       layer_agreement(layers.stack, layer_truth(field, options.size, heights), options.directions);
   VENEER_ASSIGN(trial.clustered, best_clustered(set, trial.layered.bytes_per_texel, progress));
 
+  const auto near_path = folder / fmt::format("{}-{}-near.btfset", material.name, options.seed);
   VENEER_ASSIGN(const btf::SampleSet near,
-                without_grazing_views(
-                    set, folder / fmt::format("{}-{}-near.btfset", material.name, options.seed)));
-  trial.grazing.views = static_cast<int>(set.info().views.size() - near.info().views.size());
+                btf::without_views_beyond(set, kMostFittedTheta_rad, near_path));
   VENEER_ASSIGN(const btf::LayerFit near_layers, fit_stack(near, fit, progress));
-  trial.grazing.layered = grazing_rmse(set, *material_of(near, near_layers.stack));
+  const MaterialPtr near_layered = material_of(near, near_layers.stack);
+  VENEER_ASSIGN(
+      const btf::HeldOutErrors layered_errors,
+      btf::held_out_errors(set, *near_layered, kMostFittedTheta_rad, kGrazingTexels, progress));
   VENEER_ASSIGN(const btf::Model* lpca, btf::find_model("lpca"));
   btf::FitOptions plain;
   plain.clusters = std::min(plain.clusters, set.info().texel_count());
   VENEER_ASSIGN(const MaterialPtr near_lpca, lpca->fit(near, plain, progress));
-  trial.grazing.lpca = grazing_rmse(set, *near_lpca);
+  VENEER_ASSIGN(
+      const btf::HeldOutErrors lpca_errors,
+      btf::held_out_errors(set, *near_lpca, kMostFittedTheta_rad, kGrazingTexels, progress));
+  trial.grazing = {
+      layered_errors.beyond.views, layered_errors.beyond.rmse, lpca_errors.beyond.rmse};
   return trial;
 }
 
