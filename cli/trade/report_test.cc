@@ -114,6 +114,26 @@ TEST(TradeJson, KeepsACacheThatServesNothingOffTheFronts) {
   }
 }
 
+TEST(TradeText, SaysWhichSharesAnIdleCacheServes) {
+  quality::Trade trade = example();
+  EXPECT_EQ(idle_caches_in_words(trade), "");
+  const auto cached = [&trade](std::size_t i, double served) {
+    trade.points[i].candidate.drawing.cache.spacing = 16;
+    trade.points[i].cache_served = served;
+  };
+  cached(3, 0.01);  // enough
+  EXPECT_EQ(idle_caches_in_words(trade), "");
+  cached(2, 0.002);
+  EXPECT_EQ(idle_caches_in_words(trade),
+            "1 with the angular cache is not among them: in this scene 0.2 % of the surface is "
+            "drawn from it, and under 1 % it only costs time");
+  cached(0, 0.0);
+  cached(4, 0.0099);
+  EXPECT_EQ(idle_caches_in_words(trade),
+            "3 with the angular cache are not among them: in this scene 0 to 0.99 % of the surface "
+            "is drawn from it, and under 1 % it only costs time");
+}
+
 TEST(TradeCsv, HasAFieldForEachColumnInEachLine) {
   std::istringstream lines(trade_csv(example()));
   std::string line;
@@ -186,6 +206,7 @@ press('.chip[data-model=lafortune]');
 probe.dots_filtered = document.querySelectorAll('#plot circle').length;
 probe.rows_filtered = names().length;
 probe.words = document.getElementById('words').textContent;
+probe.served = [...document.querySelectorAll('tbody tr')].map(r => r.lastElementChild.textContent).filter(Boolean);
 probe.where = document.getElementById('where').textContent;
 probe.widths = await Promise.all([...document.images].map(i => i.decode().then(() => i.naturalWidth)));
 return probe;
@@ -194,7 +215,11 @@ return probe;
 TEST(TradePage, DrawsSortsAndShowsCropsInABrowser) {
   if (!has_browser()) GTEST_SKIP() << kNoBrowser;
   const TemporaryFolder folder;
-  write_example(folder.path(), example(), about());
+  quality::Trade trade = example();
+  trade.points[4].candidate.drawing.cache.spacing =
+      16;  // of a model that has none: not in its name
+  trade.points[4].cache_served = 0.002;
+  write_example(folder.path(), trade, about());
   const auto seen = seen_in_browser(read_text(folder.path() / "index.html").value(), kHand);
   ASSERT_TRUE(seen) << seen.error().what;
   const json all = json::parse(*seen);
@@ -236,6 +261,7 @@ TEST(TradePage, DrawsSortsAndShowsCropsInABrowser) {
   EXPECT_EQ(probe["front_by_bytes"], 1);  // the nearest is the smallest here
   EXPECT_EQ(probe["dots_filtered"], 4);
   EXPECT_EQ(probe["rows_filtered"], 4);
+  EXPECT_EQ(probe["served"], json({"0.2 %"}));  // not "0 %"
   const std::string words = probe["words"];
   EXPECT_NE(words.find("lpca 4 at scale 1 is 9.0 x plain and 0.40 dE00"), std::string::npos)
       << words;
