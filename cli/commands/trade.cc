@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nlohmann/json.hpp>
 
-#include <algorithm>
 #include <cstdio>
 #include <optional>
 
@@ -69,11 +68,7 @@ std::string summary(const quality::Trade& trade, const fs::path& page) {
       quality::kLeastGain);
   for (const std::size_t i : quality::pareto_front(trade.points, &quality::TradePoint::ms_median))
     text += "\n  " + in_words(trade.points[i]);
-  if (const auto idle = std::ranges::count_if(trade.points, &quality::TradePoint::has_idle_cache))
-    text += fmt::format(
-        "\n{} with the angular cache are not among them: in this scene under 1 % of the surface is "
-        "drawn from it",
-        idle);
+  if (const std::string idle = idle_caches_in_words(trade); !idle.empty()) text += "\n" + idle;
   return text;
 }
 

@@ -214,6 +214,23 @@ std::string trade_csv(const quality::Trade& trade) {
   return text;
 }
 
+std::string idle_caches_in_words(const quality::Trade& trade) {
+  std::vector<double> percent;
+  for (const TradePoint& point : trade.points)
+    if (point.has_idle_cache()) percent.push_back(100 * point.cache_served);
+  if (percent.empty()) return "";
+  const auto [least, most] = std::ranges::minmax(percent);
+  const std::string least_text = fmt::format("{:.2g}", least);
+  const std::string most_text = fmt::format("{:.2g}", most);
+  return fmt::format(
+      "{} with the angular cache {} not among them: in this scene {} % of the surface is drawn "
+      "from "
+      "it, and under 1 % it only costs time",
+      percent.size(),
+      percent.size() == 1 ? "is" : "are",
+      least_text == most_text ? most_text : fmt::format("{} to {}", least_text, most_text));
+}
+
 Status write_trade_report(const quality::Trade& trade,
                           const TradeAbout& about,
                           const Image<Rgb32f>& reference,

@@ -33,6 +33,10 @@ struct TradeAbout {
 /// A line a candidate, the same figures.
 [[nodiscard]] std::string trade_csv(const quality::Trade& trade);
 
+/// How many ways with the angular cache are kept off the front since hardly anything is drawn from
+/// it (TradePoint::has_idle_cache), with the shares that were measured; empty where there are none.
+[[nodiscard]] std::string idle_caches_in_words(const quality::Trade& trade);
+
 /// Writes trade.json, trade.csv, ladder.toml (where there is a front) and index.html, one file
 /// that needs no other and no network.
 /// @param folder  of the run: its crops are read.  @param reference  what the full BTF asks for in

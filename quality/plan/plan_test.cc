@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/files.h"
+#include "base/testing/browser.h"
 #include "base/testing/temporary_folder.h"
 #include "btf/internal_test_sets.h"
 #include "btf/interpolated_set.h"
@@ -214,6 +215,95 @@ TEST_F(Planned, TellsWhatItFoundInTextNumbersAndAPage) {
   ASSERT_TRUE(file);
   EXPECT_EQ(file->metadata().at("planned_for"), "a scene");
   EXPECT_EQ(file->metadata().at("planned_region"), region_in_words(made->reach));
+}
+
+/// What is to be seen of the page.
+constexpr char kLook[] = R"(
+const texts = selector => [...document.querySelectorAll(selector)].map(e => e.textContent);
+const plot = id => {
+  const circles = [...document.querySelectorAll(`#${id} circle`)];
+  const of = name => circles.map(c => +c.getAttribute(name));
+  return {
+    circles: circles.length, lines: document.querySelectorAll(`#${id} polygon`).length,
+    furthest: Math.max(...circles.map(c => Math.hypot(c.getAttribute('cx'), c.getAttribute('cy')))),
+    least_radius: Math.min(...of('r')), width: document.getElementById(id).getBoundingClientRect().width,
+    outline: document.querySelector(`#${id} polygon`).getAttribute('points').split(' ').map(p => p.split(',').map(Number)),
+  };
+};
+return {
+  title: document.title, lead: texts('#lead')[0], text: texts('#text')[0],
+  views: plot('views'), lights: plot('lights'),
+  steps: texts('#steps tbody td:first-child'), verdicts: texts('#steps tbody td:last-child'),
+  taken: document.querySelectorAll('#steps tr.taken').length,
+  saved: texts('#saved tbody td:first-child'), fetches: texts('#saved tbody td:nth-child(2)'),
+  screen: texts('#screen tbody td:nth-child(4)'),
+  screen_height: document.getElementById('screen-part').getBoundingClientRect().height,
+  clickable: document.querySelectorAll('button, a, input, select, [onclick], summary').length,
+  too_wide: document.documentElement.scrollWidth - innerWidth,
+};)";
+
+TEST_F(Planned, ItsPageDrawsItsFiguresInABrowser) {
+  if (!has_browser()) GTEST_SKIP() << kNoBrowser;
+  const btf::SampleSet set = made_set(folder_.path(), true, 1e-4);
+  PlanOptions options;
+  options.models = {"dichromatic-lpca"};
+  auto made = plan(set, plate(-30, 30, 1), options);
+  ASSERT_TRUE(made) << made.error().what;
+  ASSERT_TRUE(made->general);
+  const PlanSource source{"a set", "a scene", "a </script> <profile> \xc3\xa4"};
+  const auto page_seen = [&] {
+    const auto page = folder_.path() / "plan.html";
+    EXPECT_TRUE(write_plan_page(page, *made, source, set.info()));
+    const auto seen = seen_in_browser(read_text(page).value(), kLook);
+    EXPECT_TRUE(seen) << seen.error().what;
+    const auto all = nlohmann::json::parse(seen.value_or("{}"));
+    EXPECT_EQ(all["faults"], nlohmann::json::array());
+    return all["found"];
+  };
+  const nlohmann::json seen = page_seen();
+
+  EXPECT_EQ(seen["text"], plan_text(*made));
+  EXPECT_EQ(
+      seen["lead"],
+      "a set, planned for a scene on a </script> <profile> \xc3\xa4: " + made->chosen.name() + ".");
+  // Three rings, what is measured, and a sample of what is asked.
+  constexpr std::size_t kMostAsked = 1500;
+  const auto asked =
+      std::span(made->reach.asked).first(std::min(made->reach.asked.size(), kMostAsked));
+  std::size_t asked_lights = 0;
+  for (const Asked& one : asked) asked_lights += static_cast<std::size_t>(one.lights);
+  EXPECT_EQ(seen["views"]["circles"], 3 + set.info().views.size() + asked.size());
+  EXPECT_EQ(seen["lights"]["circles"], 3 + set.info().lights.size() + asked_lights);
+  for (const char* id : {"views", "lights"}) {
+    const nlohmann::json& plot = seen[id];
+    EXPECT_LE(plot["furthest"], 1.0) << id;  // none below the horizon
+    EXPECT_GT(plot["least_radius"], 0.0) << id;
+    EXPECT_GT(plot["width"], 200.0) << id;
+    EXPECT_EQ(plot["lines"], 1) << id;
+    for (const nlohmann::json& point : plot["outline"])
+      EXPECT_LE(std::hypot(point[0].get<double>(), point[1].get<double>()), 1.0001) << id;
+  }
+  ASSERT_EQ(seen["steps"].size(), made->steps.size());
+  for (std::size_t i = 0; i < made->steps.size(); ++i) {
+    EXPECT_EQ(seen["steps"][i], made->steps[i].what);
+    EXPECT_EQ(seen["verdicts"][i], made->steps[i].verdict);
+  }
+  EXPECT_EQ(seen["taken"], std::ranges::count_if(made->steps, &PlanStep::taken));
+  EXPECT_EQ(seen["saved"][0], made->chosen.name());
+  EXPECT_EQ(seen["saved"][1], made->general->name());
+  EXPECT_EQ(seen["fetches"][0], std::to_string(made->chosen.fetches));
+  EXPECT_EQ(seen["clickable"], 0);  // what can be clicked is to be clicked here
+  EXPECT_LE(seen["too_wide"], 0);
+  // What was not measured is not shown, and what was is.
+  EXPECT_TRUE(seen["screen"].empty());
+  EXPECT_EQ(seen["screen_height"], 0);
+  OnScreen errors;
+  errors.centre.target.de00_mean = 1.25;
+  errors.averaged.received.de00_mean = 2.5;
+  made->chosen.on_screen = errors;
+  const nlohmann::json measured = page_seen();
+  EXPECT_EQ(measured["screen"], nlohmann::json({"1.25", "0.00", "0.00", "2.50"}));
+  EXPECT_GT(measured["screen_height"], 100.0);
 }
 
 // Two ways to the same figure: what is asked, in double precision on the CPU, and what the GPU
