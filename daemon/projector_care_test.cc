@@ -91,7 +91,7 @@ TEST_F(ProjectorCareTest, WhatTheProfileWasMeasuredWithIsNoAlarm) {
     return watched->text().find("filter warning") != std::string::npos;
   };
   ASSERT_TRUE(comes_to(*watched, seen));
-  watched->look(0);
+  watched->look(folder_.path() / "profile", 0);
   EXPECT_FALSE(has(FaultKind::kProjectorState)) << faults_.list().front().text;
 }
 
