@@ -10,8 +10,8 @@
 
 namespace veneer::daemon {
 
-DarkFlag::DarkFlag(std::filesystem::path folder)
-    : path_(folder.empty() ? std::filesystem::path() : std::move(folder) / kFile) {}
+DarkFlag::DarkFlag(const std::filesystem::path& folder)
+    : path_(folder.empty() ? std::filesystem::path() : folder / kFile) {}
 
 bool DarkFlag::is_up() const {
   std::error_code ignored;

@@ -15,7 +15,7 @@ class DarkFlag {
   static constexpr const char* kFile = "dark";
 
   /// @param folder  empty: nothing is remembered.
-  explicit DarkFlag(std::filesystem::path folder);
+  explicit DarkFlag(const std::filesystem::path& folder);
   /// Whether the dark was asked for and not taken back. False where that cannot be told.
   [[nodiscard]] bool is_up() const;
   /// Errors: kIo (a full disk); a flag that is down stays down then, one that is up stays up.
