@@ -4,9 +4,12 @@
 #include <dlfcn.h>
 #include <execinfo.h>
 #include <link.h>
+#include <malloc.h>
 
 #include <array>
 #include <atomic>
+#include <bit>
+#include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <string_view>
@@ -16,6 +19,7 @@ extern "C" {
 void* __libc_malloc(std::size_t bytes);
 void* __libc_calloc(std::size_t count, std::size_t bytes);
 void* __libc_realloc(void* memory, std::size_t bytes);
+void* __libc_memalign(std::size_t alignment, std::size_t bytes);
 }
 
 namespace veneer::soak {
@@ -112,5 +116,22 @@ void* calloc(std::size_t count, std::size_t bytes) {
 void* realloc(void* memory, std::size_t bytes) {
   if (veneer::soak::armed) veneer::soak::count();
   return __libc_realloc(memory, bytes);
+}
+// What is aligned more than usual (a matrix of Eigen in a vector, a cache line) comes from these.
+void* memalign(std::size_t alignment, std::size_t bytes) {
+  if (veneer::soak::armed) veneer::soak::count();
+  return __libc_memalign(alignment, bytes);
+}
+void* aligned_alloc(std::size_t alignment, std::size_t bytes) {
+  if (veneer::soak::armed) veneer::soak::count();
+  return __libc_memalign(alignment, bytes);
+}
+int posix_memalign(void** memory, std::size_t alignment, std::size_t bytes) {
+  if (veneer::soak::armed) veneer::soak::count();
+  if (alignment % sizeof(void*) != 0 || !std::has_single_bit(alignment)) return EINVAL;
+  void* const found = __libc_memalign(alignment, bytes);
+  if (found == nullptr) return ENOMEM;
+  *memory = found;
+  return 0;
 }
 }

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // The whole frame loop in real time: nothing of ours is allocated once it runs.
 #include <gtest/gtest.h>
+#include <malloc.h>
 #include <sys/mman.h>
 
 #include <atomic>
+#include <cerrno>
 #include <chrono>
 #include <cstdlib>
+#include <functional>
 #include <memory>
+#include <new>
 #include <vector>
 
 #include "base/progress.h"
@@ -147,6 +151,43 @@ class FrameLoopAllocation : public testing::Test {
     }
   }
 };
+
+/// How many allocations the guard sees of what is done, and what it made given back after.
+std::uint64_t seen_of(const std::function<void*()>& allocate) {
+  const std::uint64_t before = AllocationGuard::ours();
+  AllocationGuard::arm();
+  void* const memory = allocate();
+  AllocationGuard::disarm();
+  const std::uint64_t seen = AllocationGuard::ours() - before;
+  EXPECT_NE(memory, nullptr);
+  std::free(memory);
+  return seen;
+}
+
+TEST_F(FrameLoopAllocation, IsSeenByEveryWayThereIs) {
+  constexpr std::size_t kAlignment = 256;
+  EXPECT_EQ(seen_of([] { return std::malloc(8); }), 1U);
+  EXPECT_EQ(seen_of([] { return std::calloc(2, 8); }), 1U);
+  EXPECT_EQ(seen_of([] { return std::realloc(nullptr, 8); }), 1U);
+  EXPECT_EQ(seen_of([] { return std::aligned_alloc(kAlignment, kAlignment); }), 1U);
+  EXPECT_EQ(seen_of([] { return ::memalign(kAlignment, 8); }), 1U);
+  EXPECT_EQ(seen_of([] {
+              void* memory = nullptr;
+              EXPECT_EQ(::posix_memalign(&memory, kAlignment, 8), 0);
+              return memory;
+            }),
+            1U);
+  // What C++ makes of it, as for anything that is declared alignas(64).
+  AllocationGuard::arm();
+  const std::uint64_t before = AllocationGuard::ours();
+  void* const memory = ::operator new (8, std::align_val_t{kAlignment});
+  AllocationGuard::disarm();
+  EXPECT_EQ(AllocationGuard::ours(), before + 1);
+  EXPECT_EQ(reinterpret_cast<std::uintptr_t>(memory) % kAlignment, 0U);
+  ::operator delete (memory, std::align_val_t{kAlignment});
+  void* none = nullptr;
+  EXPECT_EQ(::posix_memalign(&none, 24, 8), EINVAL) << "no power of two";
+}
 
 TEST_F(FrameLoopAllocation, IsNoneWithTheNullOutput) { expect(Kind::kNull, true); }
 
