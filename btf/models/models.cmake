@@ -32,6 +32,7 @@ set(VENEER_MODEL_SRCS
   models/material_tensors.cc
   models/matrix_product.cc
   models/packed_lpca.cc
+  models/packed_lpca_half_angle.cc
   models/phong/phong.cc
   models/reflectance_field/reflectance_field.cc
   models/scaled_lafortune/scaled_lafortune.cc

@@ -27,6 +27,8 @@ namespace veneer::btf {
 /// coordinate mixed by hand); Mueller et al. 2003 (clusters).
 class PackedLpca {
  public:
+  /// Eigen-BRDFs in one volume, a channel each.
+  static constexpr int kScalarsPerVolume = 4;
   /// Components of the first and the second function.
   using Components = std::array<int, 2>;
   /// Reads the functions of one texel of the pyramid at every pair of the frame, [view][light];
