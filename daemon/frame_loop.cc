@@ -290,6 +290,8 @@ FrameLoop::Made FrameLoop::make_frame(const Slot& slot, FrameRecord& record) {
   renderer.finish();
   // What a lost GPU left in a picture may be anything.
   if (renderer.lost()) return lose_renderer();
+  // Whether or not the display takes what it drew.
+  parts_.faults.end(FaultKind::kGpu, parts_.clock.now());
   record.statistics = renderer.statistics();
   const double drawn_ms = milliseconds_since(begin);
   // On a virtual clock a run is the same on any machine, so that what frames take decides nothing.
@@ -312,7 +314,6 @@ FrameLoop::Made FrameLoop::make_frame(const Slot& slot, FrameRecord& record) {
   if (made == Made::kShown) {
     dark_ = false;
     parts_.wishes.is_dark = false;
-    parts_.faults.end(FaultKind::kGpu, parts_.clock.now());
   }
   give_snapshot(false);
   return made;

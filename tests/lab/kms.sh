@@ -65,7 +65,34 @@ own_picture() {
   expect "output: it held the picture until it was killed" test "$status" = 143
 }
 
+# ends STATUS TEXT KEY=VALUE...: a program that opens such an output ends with that status and says so.
+ends() {
+  local wanted=$1 text=$2 status=0
+  shift 2
+  printf '%s\n' 'driver = "kms"' "$@" >/run/output.toml
+  "$bin/veneer_lab_kms_picture" "$(cat /run/output.toml)" "$width" "$height" /run/none.png \
+    </dev/null >/run/said 2>&1 || status=$?
+  cat /run/said
+  [[ $status == "$wanted" ]] && grep -q -- "$text" /run/said
+}
+
+# A name that is wrong ends a service for good; a projector that may only be off does not.
+names() {
+  local sysfs=/sys/class/drm/card0-Virtual-1/status
+  expect "a display is found by its EDID's name" ends 0 'QEMU Monitor' 'connector = "QEMU Monitor"'
+  expect "a name that is nowhere is a mistake" ends 2 'card0 Virtual-1: QEMU Monitor' 'connector = "NO SUCH"'
+  expect "and so is a mode" ends 2 'no mode' 'mode = "123x45"'
+  echo off >"$sysfs"
+  expect "that of a display that is off may be right" ends 1 'switch it on' 'connector = "QEMU Monitor"'
+  expect "its socket waits for it" ends 1 'switch the projector on' 'connector = "Virtual-1"' 'mode = "123x45"'
+  echo detect >"$sysfs"
+  # By its socket: virtio-gpu does not hand out the EDID of such a display a second time.
+  expect "it is found once it is on" ends 0 'on Virtual-1' 'connector = "Virtual-1"'
+  expect "its name may come yet" ends 1 'switch it on' 'connector = "QEMU Monitor"'
+}
+
 mkdir -p /run/state
+names
 # Wide vectors are slow in emulation.
 export LP_NATIVE_VECTOR_WIDTH=128
 status=0

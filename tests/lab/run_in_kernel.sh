@@ -182,10 +182,11 @@ INIT
 chmod +x "$stage/root/init"
 (cd "$stage/root" && find . | cpio -o -H newc --quiet) >"$stage/initrd"
 
-# Emulation alone: no KVM is to be counted on where tests run.
+# Emulation alone: no KVM is to be counted on where tests run. Where the machine around it is busy, its timer
+# comes too late for the check that the kernel makes of it, and there it panics.
 timeout "$LAB_SECONDS" qemu-system-x86_64 "${machine[@]}" -serial "chardev:console" \
   -chardev "file,id=console,path=$stage/console" \
-  -kernel "$kernel" -initrd "$stage/initrd" -append "console=ttyS0 quiet panic=-1" </dev/null ||
+  -kernel "$kernel" -initrd "$stage/initrd" -append "console=ttyS0 quiet panic=-1 no_timer_check" </dev/null ||
   echo "lab: the machine did not end by itself within $LAB_SECONDS s" >&2
 tr -d '\r' <"$stage/console" | { grep -v -e '^lab-status ' -e 'sysrq: Power Off$' -e 'reboot: Power down$' || true; }
 status=$(tr -d '\r' <"$stage/console" | sed -n 's/^lab-status //p')

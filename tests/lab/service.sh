@@ -40,6 +40,14 @@ light() {
 }
 screen_is_lit() { (($(light) > 0)); }
 screen_is_dark() { [[ $(light) == 0 ]]; }
+# What was found of the display's colours, kept until they are back.
+colours_are_kept() { compgen -G '/var/lib/veneer/kms-card0-*.json'; }
+# plug off|detect: what is in the socket, as the kernel then says to all who listen.
+plug() {
+  echo "$1" >/sys/class/drm/card0-Virtual-1/status
+  udevadm trigger --action=change --subsystem-match=drm
+  udevadm settle --timeout=30
+}
 
 # It says what it does in the journal, not among the lines of this script.
 systemctl log-target journal
@@ -82,6 +90,26 @@ before=$(frames)
 expect_within "$patience" "frames go out" more_frames_than "$before"
 expect "to the display" says 'Virtual-1 on /dev/dri/card0' get Output
 expect_within "$patience" "which is lit" screen_is_lit
+expect "the colours that it found there are kept" colours_are_kept
+expect "in a file of its own" says '^veneer$' stat -c %U /var/lib/veneer/kms-card0-*.json
+
+# --- unplugged
+
+unplugged=$(unit MainPID)
+expect "the display is pulled out" plug off
+expect_within "$patience" "which is a fault" says '"output"' get Faults
+expect_within "$patience" "it is its state" says '"fault"' get State
+expect "and says what to do" says 'nothing is connected' journalctl --no-pager -o cat -u veneerd
+# As long as the watchdog has patience.
+sleep "$watchdog"
+expect "systemd leaves it alone" test "$(unit MainPID)" = "$unplugged"
+expect "the display is plugged in again" plug detect
+expect_within "$patience" "the fault is over" fails says '"output"' get Faults
+expect_within "$patience" "it shows a picture again" shows_a_picture
+before=$(frames)
+expect_within "$patience" "frames go out again" more_frames_than "$before"
+expect_within "$patience" "the screen is lit again" screen_is_lit
+expect "all by one process" test "$(unit MainPID)" = "$unplugged"
 
 # --- asked and told over the bus
 
@@ -124,6 +152,7 @@ expect "the watchdog did it" says "Failed with result 'watchdog'" of_systemd
 expect_within "$patience" "it shows a picture" shows_a_picture
 second=$(unit MainPID)
 kill -KILL "$second"
+expect "one that is killed leaves the colours that it found" colours_are_kept
 expect_within "$patience" "one that is killed is started anew" is_ready_as_another_than "$second"
 expect "systemd saw it" says 'status=9/KILL' of_systemd
 expect "those were two restarts" says '^2$' unit NRestarts
@@ -156,10 +185,12 @@ expect "dark as it is" says '"blank"' get State
 
 # --- stopped
 
+expect "the colours are kept again" colours_are_kept
 expect "it stops in time" timeout 30 systemctl stop veneerd
 expect "it is inactive" says '^inactive$' unit ActiveState
 expect "it ended well" says '^success$' unit Result
 expect "nothing of the dark is left" fails test -e /run/veneer/dark
+expect_not "the colours are back, and kept no longer" colours_are_kept
 expect "it left the bus" fails busctl status "$name"
 expect "the journal has its states as fields" says '"VENEER_STATE"' journal VENEER_STATE=stopping
 expect "and its faults" says '"VENEER_FAULT"' journal VENEER_FAULT=configuration

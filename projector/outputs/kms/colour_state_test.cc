@@ -34,8 +34,13 @@ FakeColours some_colours(std::uint64_t seed) {
   fill(colours.gamma, 2048);
   fill(colours.degamma, seed % 2 == 0 ? 0 : 512);  // sometimes there is none
   fill(colours.matrix, 72);
+  fill(colours.hdr, seed % 3 == 0 ? 0 : 32);
   colours.broadcast = 2;
   colours.max_bits = 10;
+  colours.colorspace = 9;
+  colours.dither = 1;
+  colours.dithering_mode = 3;
+  colours.underscan = 2;
   for (std::uint16_t& value : colours.ramp) value = static_cast<std::uint16_t>(random.next());
   return colours;
 }
@@ -44,6 +49,11 @@ FakeColours neutral_colours(const FakeColours& before, bool tables) {
   FakeColours colours = before;
   colours.broadcast = 1;
   colours.max_bits = 8;
+  colours.hdr = {};
+  colours.colorspace = 0;
+  colours.dither = 0;
+  colours.dithering_mode = 1;
+  colours.underscan = 0;
   if (tables) {
     colours.gamma = colours.degamma = colours.matrix = {};
   } else {

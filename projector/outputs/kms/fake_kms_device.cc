@@ -12,10 +12,20 @@ namespace veneer::projector {
 namespace {
 
 const std::vector<std::string>& property_names() {
-  static const std::vector<std::string> names{
-      "CRTC_ID",     "FB_ID",  "MODE_ID",       "ACTIVE",  "SRC_X",       "SRC_Y",   "SRC_W",
-      "SRC_H",       "CRTC_X", "CRTC_Y",        "CRTC_W",  "CRTC_H",      "type",    "GAMMA_LUT",
-      "DEGAMMA_LUT", "CTM",    "Broadcast RGB", "max bpc", "link-status", "rotation"};
+  static const std::vector<std::string> names{"CRTC_ID",       "FB_ID",
+                                              "MODE_ID",       "ACTIVE",
+                                              "SRC_X",         "SRC_Y",
+                                              "SRC_W",         "SRC_H",
+                                              "CRTC_X",        "CRTC_Y",
+                                              "CRTC_W",        "CRTC_H",
+                                              "type",          "GAMMA_LUT",
+                                              "DEGAMMA_LUT",   "CTM",
+                                              "Broadcast RGB", "max bpc",
+                                              "link-status",   "rotation",
+                                              "Colorspace",    "HDR_OUTPUT_METADATA",
+                                              "dither",        "dithering mode",
+                                              "underscan",     "VRR_ENABLED",
+                                              "alpha"};
   return names;
 }
 
@@ -28,6 +38,7 @@ FakeColours::Table table_of(const std::string& bytes) {
   return table;
 }
 
+constexpr std::uint64_t kOpaque = 0xffff;
 constexpr std::uint64_t kPrimary = 1;
 constexpr std::uint64_t kCursor = 2;
 
@@ -72,11 +83,17 @@ FakeKmsDevice::FakeKmsDevice(FakeCard& card, VirtualClock& clock) : card_(card),
     values_[{id, "CRTC_ID"}] = 0;
     values_[{id, "link-status"}] = 0;
     values_[{id, "Broadcast RGB"}] = 0;
+    if (card.extras) {
+      for (const char* name :
+           {"Colorspace", "HDR_OUTPUT_METADATA", "dither", "dithering mode", "underscan"})
+        values_[{id, name}] = 0;
+    }
     if (card.most_bits) values_[{id, "max bpc"}] = *card.most_bits;
   }
   for (std::size_t i = 0; i < static_cast<std::size_t>(card.crtcs); ++i) {
     values_[{crtc_id(i), "MODE_ID"}] = 0;
     values_[{crtc_id(i), "ACTIVE"}] = 0;
+    if (card.extras) values_[{crtc_id(i), "VRR_ENABLED"}] = 1;  // as another program left it
     if (card.tables) {
       for (const char* name : {"GAMMA_LUT", "DEGAMMA_LUT", "CTM"}) values_[{crtc_id(i), name}] = 0;
     }
@@ -88,18 +105,28 @@ FakeKmsDevice::FakeKmsDevice(FakeCard& card, VirtualClock& clock) : card_(card),
           values_[{plane, name}] = 0;
       }
       values_[{plane, "rotation"}] = 4;  // upside down, as another program left it
+      if (card.extras) values_[{plane, "alpha"}] = kOpaque / 3;  // likewise
     }
   }
   if (card.hardware == nullptr) return;
   const FakeColours& found = card.hardware->colours();
-  const auto load = [this](const std::string& name, const FakeColours::Table& table) {
-    if (!card_.tables || table.size == 0) return;
+  const auto load = [this](KmsId object, const char* name, const FakeColours::Table& table) {
+    if (table.size == 0) return;
     blobs_[next_id_] = text_of(table);
-    values_[{crtc_id(0), name}] = next_id_++;
+    values_[{object, name}] = next_id_++;
   };
-  load("GAMMA_LUT", found.gamma);
-  load("DEGAMMA_LUT", found.degamma);
-  load("CTM", found.matrix);
+  if (card.tables) {
+    load(crtc_id(0), "GAMMA_LUT", found.gamma);
+    load(crtc_id(0), "DEGAMMA_LUT", found.degamma);
+    load(crtc_id(0), "CTM", found.matrix);
+  }
+  if (card.extras) {
+    load(connector_id(0), "HDR_OUTPUT_METADATA", found.hdr);
+    values_[{connector_id(0), "Colorspace"}] = found.colorspace;
+    values_[{connector_id(0), "dither"}] = found.dither;
+    values_[{connector_id(0), "dithering mode"}] = found.dithering_mode;
+    values_[{connector_id(0), "underscan"}] = found.underscan;
+  }
   values_[{connector_id(0), "Broadcast RGB"}] = found.broadcast;
   if (card.most_bits) values_[{connector_id(0), "max bpc"}] = found.max_bits;
 }
@@ -183,7 +210,7 @@ Result<KmsResources> FakeKmsDevice::resources() {
   return found;
 }
 
-Result<KmsConnector> FakeKmsDevice::connector(KmsId id, bool /*probe*/) {
+Result<KmsConnector> FakeKmsDevice::connector(KmsId id, bool probe) {
   called();
   const std::size_t i = id - connector_id(0);
   if (card_.gone || i >= card_.connectors.size())
@@ -193,10 +220,10 @@ Result<KmsConnector> FakeKmsDevice::connector(KmsId id, bool /*probe*/) {
   found.id = id;
   found.name = fake.name;
   found.connected = fake.connected;
-  if (fake.connected) {
-    found.modes = fake.modes;
-    found.edid = fake.edid;
-  }
+  Known& known = known_[id];
+  if (probe) known = fake.connected ? Known{fake.modes, fake.edid} : Known{};
+  found.modes = known.modes;
+  found.edid = known.edid;
   for (std::size_t k = 0; k < static_cast<std::size_t>(card_.crtcs); ++k)
     found.possible_crtcs.push_back(crtc_id(k));
   return found;
@@ -212,11 +239,17 @@ Result<std::vector<KmsProperty>> FakeKmsDevice::properties(KmsId object, KmsKind
     property.name = key.second;
     property.value = value;
     const std::string& name = key.second;
-    property.is_blob =
-        name == "MODE_ID" || name == "GAMMA_LUT" || name == "DEGAMMA_LUT" || name == "CTM";
+    property.is_blob = name == "MODE_ID" || name == "GAMMA_LUT" || name == "DEGAMMA_LUT" ||
+                       name == "CTM" || name == "HDR_OUTPUT_METADATA";
     if (name == "type") property.choices = {{"Overlay", 0}, {"Primary", 1}, {"Cursor", 2}};
     if (name == "Broadcast RGB")
       property.choices = {{"Automatic", 0}, {"Full", 1}, {"Limited 16:235", 2}};
+    if (name == "Colorspace") property.choices = {{"BT2020_RGB", 9}, {"Default", 0}};
+    if (name == "dither") property.choices = {{"on", 1}, {"off", 0}};
+    if (name == "dithering mode")
+      property.choices = {{"auto", 0}, {"off", 1}, {"static 2x2", 2}, {"dynamic 2x2", 3}};
+    if (name == "underscan") property.choices = {{"off", 0}, {"on", 1}, {"auto", 2}};
+    if (name == "alpha") property.range.emplace(0, kOpaque);
     if (name == "link-status") property.choices = {{"Good", 0}, {"Bad", 1}};
     if (name == "rotation") property.choices = {{"rotate-0", 0}, {"rotate-180", 2}};
     if (name == "max bpc") property.range.emplace(6, *card_.most_bits);
@@ -275,14 +308,21 @@ int FakeKmsDevice::check(const Values& values) const {
 void FakeKmsDevice::keep_colours(const Values& values) {
   if (card_.hardware == nullptr) return;
   FakeColours colours = card_.hardware->colours();
-  const auto table = [&](const std::string& name) {
-    const auto id = static_cast<KmsId>(values.at({crtc_id(0), name}));
+  const auto table = [&](KmsId object, const char* name) {
+    const auto id = static_cast<KmsId>(values.at({object, name}));
     return id == 0 ? FakeColours::Table{} : table_of(blobs_.at(id));
   };
   if (card_.tables) {
-    colours.gamma = table("GAMMA_LUT");
-    colours.degamma = table("DEGAMMA_LUT");
-    colours.matrix = table("CTM");
+    colours.gamma = table(crtc_id(0), "GAMMA_LUT");
+    colours.degamma = table(crtc_id(0), "DEGAMMA_LUT");
+    colours.matrix = table(crtc_id(0), "CTM");
+  }
+  if (card_.extras) {
+    colours.hdr = table(connector_id(0), "HDR_OUTPUT_METADATA");
+    colours.colorspace = values.at({connector_id(0), "Colorspace"});
+    colours.dither = values.at({connector_id(0), "dither"});
+    colours.dithering_mode = values.at({connector_id(0), "dithering mode"});
+    colours.underscan = values.at({connector_id(0), "underscan"});
   }
   colours.broadcast = values.at({connector_id(0), "Broadcast RGB"});
   if (card_.most_bits) colours.max_bits = values.at({connector_id(0), "max bpc"});

@@ -24,9 +24,13 @@ struct FakeColours {
     std::size_t size = 0;
     bool operator==(const Table&) const = default;
   };
-  Table gamma, degamma, matrix;
+  Table gamma, degamma, matrix, hdr;
   std::uint64_t broadcast = 0;
   std::uint64_t max_bits = 12;
+  std::uint64_t colorspace = 0;
+  std::uint64_t dither = 0;          // radeon's
+  std::uint64_t dithering_mode = 0;  // nouveau's
+  std::uint64_t underscan = 0;
   std::array<std::uint16_t, 768> ramp{};
   bool operator==(const FakeColours&) const = default;
 };
@@ -59,6 +63,8 @@ struct FakeCard {
   int crtcs = 2;
   std::vector<std::uint32_t> formats{kXrgb8888, kXrgb2101010};
   bool tables = true;  ///< GAMMA_LUT, DEGAMMA_LUT and CTM; else a ramp alone
+  bool extras =
+      true;  ///< what only some drivers have: Colorspace, HDR, dither, underscan, VRR, alpha
   std::optional<std::uint64_t> most_bits = 12;  ///< of "max bpc"; none: no such property
   bool gpu = false;
   Duration period = std::chrono::microseconds(16'667);
@@ -84,7 +90,8 @@ struct FakeCard {
 [[nodiscard]] KmsMode fake_mode(int width, int height, double refresh_hz, bool preferred = false);
 
 /// A KmsDevice on a virtual clock, with retraces at multiples of the period, that takes what the
-/// kernel takes and refuses what it refuses.
+/// kernel takes and refuses what it refuses. A change of what is plugged in is known at once, but
+/// modes and EDID are those of the last probe.
 class FakeKmsDevice final : public KmsDevice {
  public:
   FakeKmsDevice(FakeCard& card, VirtualClock& clock);
@@ -139,6 +146,12 @@ class FakeKmsDevice final : public KmsDevice {
     Values values;
   };
 
+  /// What the kernel knows of a display from the last time that it was asked.
+  struct Known {
+    std::vector<KmsMode> modes;
+    std::string edid;
+  };
+
   void called();
   void advance();
   [[nodiscard]] int check(const Values& values) const;
@@ -151,6 +164,7 @@ class FakeKmsDevice final : public KmsDevice {
   FakeCard& card_;
   VirtualClock& clock_;
   bool master_ = false;
+  std::map<KmsId, Known> known_;
   Values values_;
   std::map<KmsId, std::string> blobs_;
   std::size_t caller_blobs_ = 0;

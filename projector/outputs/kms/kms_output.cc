@@ -303,9 +303,9 @@ Status KmsOutput::trouble_with(int refused, std::string_view what) {
 }
 
 /// Looks after a change whether the display is the same as before.
-Status KmsOutput::find_display_again() {
-  const Result<KmsConnector> found =
-      device_->connector(display_.connector.id, trouble_ == Trouble::kUnplugged);
+/// @param ask  the display itself: only then another one in its place is known for what it is.
+Status KmsOutput::find_display_again(bool ask) {
+  const Result<KmsConnector> found = device_->connector(display_.connector.id, ask);
   if (!found)
     return fail(Errc::kDisconnected,
                 "{}: the connector is gone ({}); open the output again",
@@ -357,7 +357,9 @@ Status KmsOutput::become_ready() {
     trouble_text_ = fmt::format("{}: {}", doing(), meaning_of(EACCES));
     return unavailable();
   }
-  return find_display_again();
+  // Between two frames it may have been exchanged. To ask takes a few frames, which nobody misses
+  // then.
+  return find_display_again(changed || trouble_ == Trouble::kUnplugged);
 }
 
 void KmsOutput::take(const KmsFlip& flip) {

@@ -109,7 +109,7 @@ class KmsOutput final : public Output {
   [[nodiscard]] Result<std::vector<KmsSetting>> full_settings(KmsId framebuffer, int bits);
   [[nodiscard]] Status configure(std::size_t buffer);
   [[nodiscard]] Status become_ready();
-  [[nodiscard]] Status find_display_again();
+  [[nodiscard]] Status find_display_again(bool ask);
   [[nodiscard]] Status trouble_with(int refused, std::string_view doing);
   [[nodiscard]] Status unavailable() const;
   void take(const KmsFlip& flip);

@@ -145,6 +145,9 @@ TEST_F(KmsOutputTest, OtherProgramsLeftoversDoNotCoverThePicture) {
   output_ = std::move(*opened);
   EXPECT_EQ(device_->value(FakeKmsDevice::cursor_id(0), "FB_ID"), 0U);
   EXPECT_EQ(device_->value(FakeKmsDevice::primary_id(0), "rotation"), 1U);  // upright
+  EXPECT_EQ(device_->value(FakeKmsDevice::primary_id(0), "alpha"), 0xffffU);
+  // Else the retrace would come when the card likes.
+  EXPECT_EQ(device_->value(FakeKmsDevice::crtc_id(0), "VRR_ENABLED"), 0U);
 }
 
 TEST_F(KmsOutputTest, TenBitsAreAskedForFirstAndGivenUpAsConfigured) {
@@ -247,6 +250,27 @@ TEST_F(KmsOutputTest, AnotherDisplayInItsPlaceIsNotTakenForIt) {
   card_.connectors[0].edid = own;
   card_.changed = true;
   EXPECT_TRUE(show(random_picture(1, 8)));
+}
+
+TEST_F(KmsOutputTest, AnotherDisplayIsKnownForWhatItIsAfterAPause) {
+  options_.connector = "EPSON PJ";
+  ASSERT_TRUE(open());
+  const FakeConnector own = card_.connectors[0];
+  const auto plug = [this](const FakeConnector& connector) {
+    card_.connectors[0] = connector;
+    card_.changed = true;
+    return show(random_picture(1, 8));
+  };
+  ASSERT_FALSE(plug({"HDMI-A-1", "", false, {}}));
+  const Status other = plug({"HDMI-A-1", fake_edid("SONY", "9"), true, own.modes});
+  ASSERT_FALSE(other);
+  EXPECT_NE(other.error().what.find("SONY"), std::string::npos) << other.error().what;
+  ASSERT_FALSE(plug({"HDMI-A-1", "", false, {}}));
+  const Status other_modes = plug({"HDMI-A-1", own.edid, true, {fake_mode(32, 24, 60)}});
+  ASSERT_FALSE(other_modes);
+  EXPECT_NE(other_modes.error().what.find("64x48@60.00"), std::string::npos)
+      << other_modes.error().what;
+  EXPECT_TRUE(plug(own));
 }
 
 TEST_F(KmsOutputTest, ADisplayThatLostTheModeIsUnavailable) {

@@ -4,6 +4,7 @@
 #include <SDL.h>
 
 #include <cstdlib>
+#include <string_view>
 
 #include "projector/outputs/window/internal_sdl.h"
 
@@ -20,8 +21,6 @@ Result<SdlVideo> SdlVideo::begin() {
         "(DISPLAY or WAYLAND_DISPLAY is set there)");
   // Ctrl-C stays with the program that opens a window.
   SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
-  // Else SDL may take over the thread's GL context to copy a window's pixels.
-  SDL_SetHint(SDL_HINT_FRAMEBUFFER_ACCELERATION, "0");
   SDL_SetHint(SDL_HINT_VIDEO_ALLOW_SCREENSAVER, "0");
   SDL_SetHint(SDL_HINT_VIDEO_MINIMIZE_ON_FOCUS_LOSS, "0");
   if (SDL_InitSubSystem(SDL_INIT_VIDEO) != 0)
@@ -30,6 +29,10 @@ Result<SdlVideo> SdlVideo::begin() {
         "looking for displays: {}; is there a desktop (DISPLAY or WAYLAND_DISPLAY), and may "
         "this user open windows on it?",
         SDL_GetError());
+  // X11 takes a window's pixels as they are. On Wayland SDL 2.26 has no way but a texture, for
+  // which it takes the thread's GL context.
+  const bool takes_pixels = std::string_view(SDL_GetCurrentVideoDriver()) == "x11";
+  SDL_SetHint(SDL_HINT_FRAMEBUFFER_ACCELERATION, takes_pixels ? "0" : "1");
   static constexpr char kToken = 0;
   return SdlVideo(&kToken);
 }

@@ -16,6 +16,21 @@ struct CloseWindow {
 };
 using WindowHandle = std::unique_ptr<SDL_Window, CloseWindow>;
 
+/// Where SDL draws with a GL context of its own, it believes that it is current for good. It is let
+/// go of, so that SDL takes it again, and the renderer of this thread its own.
+class LetGoOfGl {
+ public:
+  explicit LetGoOfGl(SDL_Window* window) : window_(window) {}
+  ~LetGoOfGl() {
+    if (SDL_GL_GetCurrentContext() != nullptr) SDL_GL_MakeCurrent(window_, nullptr);
+  }
+  LetGoOfGl(const LetGoOfGl&) = delete;
+  LetGoOfGl& operator=(const LetGoOfGl&) = delete;
+
+ private:
+  SDL_Window* window_;
+};
+
 std::string text_of(const std::vector<Display>& displays) {
   std::string text;
   for (const Display& d : displays)
@@ -107,6 +122,7 @@ Status WindowOutput::present(const Frame& frame) {
         (event.type == SDL_WINDOWEVENT && event.window.event == SDL_WINDOWEVENT_CLOSE))
       return fail(Errc::kCancelled, "{}: the window was closed", doing());
   }
+  const LetGoOfGl let_go(state_->window.get());
   // After a change of the window it is another surface, so it is asked for each time.
   SDL_Surface* surface = SDL_GetWindowSurface(state_->window.get());
   if (surface == nullptr) return fail(Errc::kIo, "{}: {}", doing(), SDL_GetError());

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Against a real X server that draws into a file (Xvfb -fbdir).
+// Against a real X server that draws into a file (Xvfb -fbdir), and a Wayland compositor that draws
+// into that.
 #include "projector/outputs/window/window_output.h"
 
+#include <SDL.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -10,6 +12,7 @@
 #include <array>
 #include <chrono>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <thread>
@@ -101,8 +104,65 @@ class XServer {
   bool running_ = false;
 };
 
-Image<Rgb16> random_picture(std::uint64_t seed) {
-  Image<Rgb16> picture(kWidth, kHeight);
+/// Weston, whose only screen is the X server's; absent where it is not installed.
+class WaylandCompositor {
+ public:
+  explicit WaylandCompositor(const XServer& server) {
+    if (!server.running()) return;
+    ::setenv("XDG_RUNTIME_DIR", folder_.path().c_str(), 1);
+    child_ = ::fork();
+    if (child_ == 0) {
+      const std::string width = fmt::format("--width={}", kWidth);
+      const std::string height = fmt::format("--height={}", kHeight);
+      const std::string log = fmt::format("--log={}", (folder_.path() / "log").string());
+      ::execlp("weston",
+               "weston",
+               "--backend=x11-backend.so",
+               "--use-pixman",
+               "--no-config",
+               "--idle-time=0",
+               "--socket=wayland-test",
+               width.c_str(),
+               height.c_str(),
+               log.c_str(),
+               static_cast<char*>(nullptr));
+      ::_exit(127);
+    }
+    constexpr auto kPatience = std::chrono::seconds(30);
+    const auto deadline = std::chrono::steady_clock::now() + kPatience;
+    while (!std::filesystem::exists(folder_.path() / "wayland-test")) {
+      if (::waitpid(child_, nullptr, WNOHANG) == child_) {
+        child_ = -1;
+        return;
+      }
+      if (std::chrono::steady_clock::now() > deadline) return;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    ::unsetenv("DISPLAY");
+    ::setenv("WAYLAND_DISPLAY", "wayland-test", 1);
+    ::setenv("SDL_VIDEODRIVER", "wayland", 1);
+    running_ = true;
+  }
+  ~WaylandCompositor() {
+    ::unsetenv("WAYLAND_DISPLAY");
+    ::unsetenv("XDG_RUNTIME_DIR");
+    if (child_ <= 0) return;
+    ::kill(child_, SIGTERM);
+    ::waitpid(child_, nullptr, 0);
+  }
+  WaylandCompositor(const WaylandCompositor&) = delete;
+  WaylandCompositor& operator=(const WaylandCompositor&) = delete;
+
+  [[nodiscard]] bool running() const { return running_; }
+
+ private:
+  TemporaryFolder folder_;
+  pid_t child_ = -1;
+  bool running_ = false;
+};
+
+Image<Rgb16> random_picture(std::uint64_t seed, int width = kWidth, int height = kHeight) {
+  Image<Rgb16> picture(width, height);
   Pcg32 random(seed);
   for (Rgb16& pixel : picture.pixels()) {
     for (std::uint16_t& code : pixel) code = static_cast<std::uint16_t>(random.next() % 256);
@@ -116,9 +176,11 @@ Frame frame_of(const Image<Rgb16>& picture) {
   return frame;
 }
 
-/// The pixels that differ between the screen and a picture, once they do not or time is up: a
-/// window appears when the server has got round to it.
+/// The pixels that differ between the middle of the screen and a picture, once they do not or time
+/// is up: a window appears when the server has got round to it.
 int differences(const XServer& server, WindowOutput& output, const Image<Rgb16>& picture) {
+  const int left = (kWidth - picture.width()) / 2;
+  const int top = (kHeight - picture.height()) / 2;
   int different = -1;
   for (int attempt = 0; attempt < 100 && different != 0; ++attempt) {
     if (const Status shown = output.present(frame_of(picture)); !shown) {
@@ -128,8 +190,10 @@ int differences(const XServer& server, WindowOutput& output, const Image<Rgb16>&
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
     const Image<Rgb16> screen = server.screen();
     different = 0;
-    for (std::size_t i = 0; i < picture.pixels().size(); ++i)
-      different += screen.pixels()[i] == picture.pixels()[i] ? 0 : 1;
+    for (int y = 0; y < picture.height(); ++y) {
+      for (int x = 0; x < picture.width(); ++x)
+        different += screen(left + x, top + y) == picture(x, y) ? 0 : 1;
+    }
   }
   return different;
 }
@@ -174,6 +238,58 @@ TEST_F(WindowOutputTest, RefusesWhatItWouldHaveToChange) {
   const Status shown = (*output)->present(deep);
   ASSERT_FALSE(shown);
   EXPECT_NE(shown.error().what.find("8 bits"), std::string::npos) << shown.error().what;
+}
+
+TEST_F(WindowOutputTest, NotFullScreenItIsAWindowOfThePicturesSize) {
+  auto output = WindowOutput::open(WindowOutputOptions{.fullscreen = false});
+  ASSERT_TRUE(output) << output.error().what;
+  const Image<Rgb16> picture = random_picture(1, 100, 80);
+  EXPECT_EQ(differences(server_, **output, picture), 0);
+  // And no more than that is covered.
+  const Image<Rgb16> screen = server_.screen();
+  EXPECT_EQ(screen(0, 0), Rgb16{});
+  EXPECT_EQ(screen(kWidth - 1, kHeight - 1), Rgb16{});
+}
+
+TEST_F(WindowOutputTest, ClosedOrEscapedItIsCancelled) {
+  SDL_Event quit{};
+  quit.type = SDL_QUIT;
+  SDL_Event escape{};
+  escape.type = SDL_KEYDOWN;
+  escape.key.keysym.sym = SDLK_ESCAPE;
+  SDL_Event close{};
+  close.type = SDL_WINDOWEVENT;
+  close.window.event = SDL_WINDOWEVENT_CLOSE;
+  SDL_Event other = escape;
+  other.key.keysym.sym = SDLK_SPACE;
+  const Image<Rgb16> picture = random_picture(1);
+  for (SDL_Event event : {quit, escape, close, other}) {
+    auto output = WindowOutput::open(WindowOutputOptions{});
+    ASSERT_TRUE(output) << output.error().what;
+    ASSERT_TRUE((*output)->present(frame_of(picture)));
+    ASSERT_EQ(SDL_PushEvent(&event), 1) << SDL_GetError();
+    const Status shown = (*output)->present(frame_of(picture));
+    if (event.type == SDL_KEYDOWN && event.key.keysym.sym == SDLK_SPACE) {
+      EXPECT_TRUE(shown) << shown.error().what;
+      continue;
+    }
+    ASSERT_FALSE(shown) << event.type;
+    EXPECT_EQ(shown.error().code, Errc::kCancelled) << shown.error().what;
+  }
+}
+
+// Where there is no X server at all, only a texture takes pixels to the screen.
+TEST(WindowOutputOnWayland, EveryCodeReachesTheScreenUnchanged) {
+  const XServer server;
+  const WaylandCompositor compositor(server);
+  if (!compositor.running()) GTEST_SKIP() << "there is no Xvfb or no weston on this machine";
+  auto output = WindowOutput::open(WindowOutputOptions{});
+  ASSERT_TRUE(output) << output.error().what;
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    EXPECT_EQ(differences(server, **output, random_picture(seed)), 0) << seed;
+    // The thread's context is the renderer's again.
+    EXPECT_EQ(SDL_GL_GetCurrentContext(), nullptr);
+  }
 }
 
 TEST(WindowOutputWithoutADesktop, SaysWhatIsMissing) {
