@@ -25,6 +25,7 @@ constexpr std::array kWatched{
     Watched{"degamma", "the projector's own tone curve (degamma)"},
     Watched{"processing", "the processing of the picture"},
     Watched{"led_levels", "the LED levels (red, green, blue)"},
+    Watched{"led_enable", "what lights the LEDs"},
     Watched{"lamps_on", "which lamps burn"},
     Watched{"model", "the model"},
     Watched{"serial", "the serial number"},
@@ -120,6 +121,7 @@ ControlRecord to_record(const ProjectorState& state) {
   put_flag("locked", state.locked);
   put_flag("degamma", state.degamma);
   put_flag("processing", state.processing);
+  put_text("led_enable", state.led_enable);
   put_text("maker", state.maker);
   put_text("model", state.model);
   put_text("name", state.name);

@@ -40,6 +40,8 @@ struct ProjectorState {
   std::optional<bool> degamma;     ///< a tone curve of its own, after the cable
   std::optional<bool> processing;  ///< scales and processes the picture; false: shows it raw
   std::optional<LedLevels> led_levels;
+  /// What lights its LEDs: "sequencer", or by hand, as "red blue". Empty while they are dark.
+  std::optional<std::string> led_enable;
   std::optional<std::string> maker;
   std::optional<std::string> model;
   std::optional<std::string> name;  ///< that somebody gave it
@@ -54,8 +56,9 @@ using ControlRecord = std::map<std::string, std::string>;
 [[nodiscard]] ControlRecord to_record(const ProjectorState& state);
 
 /// What changed of that which matters for colour, one sentence each: power, input, mute, freeze,
-/// degamma, processing, LED levels, which lamps burn, a lamp that was replaced (its hours went
-/// down), another device or firmware. What one of the two does not tell is no difference.
+/// degamma, processing, LED levels, what lights the LEDs, which lamps burn, a lamp that was
+/// replaced (its hours went down), another device or firmware. What one of the two does not tell is
+/// no difference.
 [[nodiscard]] std::vector<std::string> differences(const ControlRecord& then,
                                                    const ControlRecord& now);
 [[nodiscard]] std::vector<std::string> differences(const ProjectorState& then,

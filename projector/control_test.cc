@@ -25,6 +25,7 @@ ProjectorState whole_state() {
   state.degamma = false;
   state.processing = true;
   state.led_levels = LedLevels{100, 120, 90};
+  state.led_enable = "sequencer";
   state.maker = "Maker";
   state.model = "Model";
   state.name = "Hall 3";
@@ -41,7 +42,7 @@ TEST(ProjectorState, WhatIsNotToldIsNotInTheRecord) {
   EXPECT_EQ(record.at("projector.led_levels"), "100 120 90");
   EXPECT_EQ(record.at("projector.degamma"), "off");
   EXPECT_EQ(record.at("projector.health.fan"), "ok");
-  EXPECT_EQ(record.size(), 17U);  // 15 values and two parts' health
+  EXPECT_EQ(record.size(), 18U);  // 16 values and two parts' health
 }
 
 TEST(ProjectorState, AStateDoesNotDifferFromItselfOrFromSilence) {
@@ -63,6 +64,7 @@ TEST(ProjectorState, EveryChangeThatMovesColoursIsNamedAlone) {
        [](ProjectorState& s) {
          s.led_levels = LedLevels{100, 120, 91};
        }},
+      {"what lights the LEDs", [](ProjectorState& s) { s.led_enable = "red blue"; }},
       {"which lamps burn",
        [](ProjectorState& s) {
          s.lamps = {{1234, true}, {99, true}};

@@ -243,7 +243,7 @@ TEST_F(Dlpc350Bus, ARefusalIsSaidOfACommandAndLeavesAStateEmpty) {
       {0x0B01, [](const auto& s) { return !s.led_levels; }},
       {0x1A00, [](const auto& s) { return !s.input; }},
       {0x1A05, [](const auto& s) { return !s.led_levels; }},
-      {0x1A07, [](const auto& s) { return !s.muted; }},
+      {0x1A07, [](const auto& s) { return !s.muted && !s.led_enable; }},
       {0x1A0A, [](const auto& s) { return s.health.empty(); }},
       {0x1A0C, [](const auto& s) { return !s.frozen && !s.degamma; }},
       {0x1A1B, [](const auto& s) { return !s.processing; }}};
@@ -311,6 +311,35 @@ TEST_F(Dlpc350Bus, MuteTakesTheLedsAndGivesThemBackAsTheyWere) {
     ASSERT_TRUE(engine->mute(false));
     EXPECT_EQ(value(0x1A07), std::vector<int>{enabled});
   }
+}
+
+TEST_F(Dlpc350Bus, WhatLitTheLedsIsNotLostWhereAnotherProgramUnblanks) {
+  device_.plug();
+  set(0x1A07, {0x05});
+  const auto before = open()->read_state();
+  ASSERT_TRUE(before) << before.error().what;
+  EXPECT_EQ(before->led_enable, "red blue");
+  const auto blank_and_unblank = [this] {
+    ASSERT_TRUE(open()->mute(true));
+    const auto dark = open()->read_state();
+    ASSERT_TRUE(dark) << dark.error().what;
+    EXPECT_EQ(dark->muted, true);
+    EXPECT_FALSE(dark->led_enable) << "nobody can tell while they are dark";
+    ASSERT_TRUE(open()->mute(false));
+  };
+  options_.led_enable = "red blue";
+  blank_and_unblank();
+  EXPECT_EQ(value(0x1A07), std::vector<int>{0x05});
+  EXPECT_TRUE(differences(*before, *open()->read_state()).empty());
+  // Where nobody says so, they are as after the device's start, and that is seen to be a change.
+  options_ = {};
+  blank_and_unblank();
+  EXPECT_EQ(value(0x1A07), std::vector<int>{0x08});
+  const auto changes = differences(*before, *open()->read_state());
+  ASSERT_EQ(changes.size(), 1U);
+  EXPECT_THAT(changes.front(), HasSubstr("\"red blue\" and is \"sequencer\""));
+  options_.led_enable = "all";
+  EXPECT_EQ(Dlpc350::open(options_, clock_).error().code, Errc::kInvalidOption);
 }
 
 TEST_F(Dlpc350Bus, ATestPatternTakesTheInputAndKeepsItsWidth) {
@@ -392,7 +421,8 @@ TEST_F(Dlpc350Bus, AWatchSeesItsLedsTurnedAndItPulledOutAndPutInAgain) {
 
 TEST_F(Dlpc350Bus, TheRegistryOpensIt) {
   device_.plug();
-  auto toml = TomlReader::parse("driver = \"dlpc350\"\nserial = \"LCR3\"", "test");
+  auto toml =
+      TomlReader::parse("driver = \"dlpc350\"\nserial = \"LCR3\"\nled_enable = \"red\"", "test");
   ASSERT_TRUE(toml);
   const auto control = open_control(*toml, clock_);
   ASSERT_TRUE(control) << control.error().what;
