@@ -321,8 +321,13 @@ Status Dlpc350::set_processing(bool on) {
 
 Status Dlpc350::show_test_pattern(const std::string& name) {
   VENEER_ASSIGN(const std::uint8_t pattern, dlpc350::test_pattern(name));
-  VENEER_TRY(select_input("test-pattern"));
-  return write(Command::kTestPattern, pattern);
+  VENEER_ASSIGN(const std::uint8_t before, require_byte(Command::kInputSource));
+  VENEER_ASSIGN(const std::uint8_t wanted, dlpc350::with_input(before, "test-pattern"));
+  VENEER_TRY(write(Command::kInputSource, wanted));
+  Status shown = write(Command::kTestPattern, pattern);
+  // It would go on with whatever pattern it had, in place of the picture.
+  if (!shown) static_cast<void>(write(Command::kInputSource, before));
+  return shown;
 }
 
 }  // namespace veneer::projector

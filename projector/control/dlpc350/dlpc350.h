@@ -60,7 +60,7 @@ class Dlpc350 final : public ProjectorControl {
   [[nodiscard]] Status set_degamma(bool on) override;
   [[nodiscard]] Status set_led_levels(const LedLevels& levels) override;
   [[nodiscard]] Status set_processing(bool on) override;
-  /// Selects the input "test-pattern" too.
+  /// Selects the input "test-pattern" too, and goes back to the one of before where it is refused.
   [[nodiscard]] Status show_test_pattern(const std::string& name) override;
 
  private:
