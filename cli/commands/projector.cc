@@ -90,6 +90,12 @@ ordered_json json_of(const ProjectorControl& control, const ProjectorState& stat
     if (value) json[key] = *value;
   };
   put("input", state.input);
+  put("input_label", state.input_label);
+  const auto put_size = [&](const char* key, const std::optional<projector::Resolution>& size) {
+    if (size) json[key] = {size->width, size->height};
+  };
+  put_size("input_resolution", state.input_resolution);
+  put_size("panel_resolution", state.panel_resolution);
   put("muted", state.muted);
   put("frozen", state.frozen);
   put("locked", state.locked);
