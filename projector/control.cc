@@ -20,11 +20,13 @@ struct Watched {
 constexpr std::array kWatched{
     Watched{"power", "the power"},
     Watched{"input", "the input"},
+    Watched{"input_resolution", "the resolution of the input"},
     Watched{"muted", "the mute of the picture"},
     Watched{"frozen", "the freeze"},
     Watched{"degamma", "the projector's own tone curve (degamma)"},
     Watched{"processing", "the processing of the picture"},
     Watched{"led_levels", "the LED levels (red, green, blue)"},
+    Watched{"led_enable", "what lights the LEDs"},
     Watched{"lamps_on", "which lamps burn"},
     Watched{"model", "the model"},
     Watched{"serial", "the serial number"},
@@ -115,11 +117,18 @@ ControlRecord to_record(const ProjectorState& state) {
   };
   if (state.power != Power::kUnknown) put("power", std::string(name_of(state.power)));
   put_text("input", state.input);
+  put_text("input_label", state.input_label);
+  const auto put_size = [&](std::string_view name, const std::optional<Resolution>& size) {
+    if (size) put(name, fmt::format("{}x{}", size->width, size->height));
+  };
+  put_size("input_resolution", state.input_resolution);
+  put_size("panel_resolution", state.panel_resolution);
   put_flag("muted", state.muted);
   put_flag("frozen", state.frozen);
   put_flag("locked", state.locked);
   put_flag("degamma", state.degamma);
   put_flag("processing", state.processing);
+  put_text("led_enable", state.led_enable);
   put_text("maker", state.maker);
   put_text("model", state.model);
   put_text("name", state.name);
@@ -182,6 +191,20 @@ std::vector<std::string> warnings(const ProjectorState& state, const ControlReco
         "its own tone curve (degamma) is on: switch it off, or calibrate with it and leave it");
   if (state.locked == false && !holds(kept, "locked", "off"))
     result.push_back("it is not locked to a signal: see to the cable, the input and the mode");
+  if (state.input_resolution && state.panel_resolution &&
+      state.input_resolution != state.panel_resolution) {
+    const Resolution& in = *state.input_resolution;
+    const Resolution& panel = *state.panel_resolution;
+    if (!holds(kept, "input_resolution", fmt::format("{}x{}", in.width, in.height)) ||
+        !holds(kept, "panel_resolution", fmt::format("{}x{}", panel.width, panel.height)))
+      result.push_back(fmt::format(
+          "it scales the picture, {} x {} pixels to {} x {} of its own; set the output's mode to "
+          "those",
+          in.width,
+          in.height,
+          panel.width,
+          panel.height));
+  }
   for (const auto& [part, health] : state.health)
     if (health != Health::kOk && !holds_health(kept, part, health))
       result.push_back(fmt::format("it reports: {} {}; see its manual", part, name_of(health)));

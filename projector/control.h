@@ -27,19 +27,30 @@ struct Lamp {
 /// the driver's wires.
 using LedLevels = std::array<int, 3>;
 
+struct Resolution {
+  int width = 0;  ///< pixels
+  int height = 0;
+  bool operator==(const Resolution&) const = default;
+};
+
 /// What a projector tells of itself. What it does not tell stays empty.
 struct ProjectorState {
   Power power = Power::kUnknown;
   std::optional<std::string> input;
-  std::optional<bool> muted;               ///< the picture, not the sound
-  std::optional<bool> frozen;              ///< shows an old picture whatever comes in
-  std::optional<bool> locked;              ///< to the signal that comes in
-  std::optional<std::vector<Lamp>> lamps;  ///< none at all with most lasers and LEDs
+  std::optional<std::string> input_label;      ///< what the projector's menu calls the input
+  std::optional<Resolution> input_resolution;  ///< of what comes in
+  std::optional<Resolution> panel_resolution;  ///< of what it has, the recommended one
+  std::optional<bool> muted;                   ///< the picture, not the sound
+  std::optional<bool> frozen;                  ///< shows an old picture whatever comes in
+  std::optional<bool> locked;                  ///< to the signal that comes in
+  std::optional<std::vector<Lamp>> lamps;      ///< none at all with most lasers and LEDs
   /// "fan", "lamp", "temperature", "cover", "filter", "other".
   std::map<std::string, Health> health;
   std::optional<bool> degamma;     ///< a tone curve of its own, after the cable
   std::optional<bool> processing;  ///< scales and processes the picture; false: shows it raw
   std::optional<LedLevels> led_levels;
+  /// What lights its LEDs: "sequencer", or by hand, as "red blue". Empty while they are dark.
+  std::optional<std::string> led_enable;
   std::optional<std::string> maker;
   std::optional<std::string> model;
   std::optional<std::string> name;  ///< that somebody gave it
@@ -53,18 +64,21 @@ struct ProjectorState {
 using ControlRecord = std::map<std::string, std::string>;
 [[nodiscard]] ControlRecord to_record(const ProjectorState& state);
 
-/// What changed of that which matters for colour, one sentence each: power, input, mute, freeze,
-/// degamma, processing, LED levels, which lamps burn, a lamp that was replaced (its hours went
-/// down), another device or firmware. What one of the two does not tell is no difference.
+/// What changed of that which matters for colour, one sentence each: power, input, its resolution,
+/// mute, freeze, degamma, processing, LED levels, what lights the LEDs, which lamps burn, a lamp
+/// that was replaced (its hours went down), another device or firmware. What one of the two does
+/// not tell is no difference.
 [[nodiscard]] std::vector<std::string> differences(const ControlRecord& then,
                                                    const ControlRecord& now);
 [[nodiscard]] std::vector<std::string> differences(const ProjectorState& then,
                                                    const ProjectorState& now);
 /// What would spoil the colours now, and what to do about it: frozen, muted, degamma on, no
-/// lock, a device that is not on, health that is not ok. Empty where all is well.
+/// lock, an input that is scaled to the panel, a device that is not on, health that is not ok.
+/// Empty where all is well.
 [[nodiscard]] std::vector<std::string> warnings(const ProjectorState& state);
-/// The same without what a profile was measured with, by its record: degamma on, no lock, and parts
-/// in no better health. Not on, frozen or muted hides the picture, whatever was measured.
+/// The same without what a profile was measured with, by its record: degamma on, no lock, this
+/// scaling, and parts in no better health. Not on, frozen or muted hides the picture, whatever was
+/// measured.
 [[nodiscard]] std::vector<std::string> warnings(const ProjectorState& state,
                                                 const ControlRecord& kept);
 

@@ -17,6 +17,9 @@ ProjectorState whole_state() {
   ProjectorState state;
   state.power = Power::kOn;
   state.input = "digital1";
+  state.input_label = "HDMI left";
+  state.input_resolution = Resolution{1920, 1080};
+  state.panel_resolution = Resolution{1920, 1080};
   state.muted = false;
   state.frozen = false;
   state.locked = true;
@@ -25,6 +28,7 @@ ProjectorState whole_state() {
   state.degamma = false;
   state.processing = true;
   state.led_levels = LedLevels{100, 120, 90};
+  state.led_enable = "sequencer";
   state.maker = "Maker";
   state.model = "Model";
   state.name = "Hall 3";
@@ -41,7 +45,8 @@ TEST(ProjectorState, WhatIsNotToldIsNotInTheRecord) {
   EXPECT_EQ(record.at("projector.led_levels"), "100 120 90");
   EXPECT_EQ(record.at("projector.degamma"), "off");
   EXPECT_EQ(record.at("projector.health.fan"), "ok");
-  EXPECT_EQ(record.size(), 17U);  // 15 values and two parts' health
+  EXPECT_EQ(record.at("projector.input_resolution"), "1920x1080");
+  EXPECT_EQ(record.size(), 21U);  // 19 values and two parts' health
 }
 
 TEST(ProjectorState, AStateDoesNotDifferFromItselfOrFromSilence) {
@@ -55,6 +60,10 @@ TEST(ProjectorState, EveryChangeThatMovesColoursIsNamedAlone) {
       {"the power was \"on\" and is \"cooling\"",
        [](ProjectorState& s) { s.power = Power::kCooling; }},
       {"input", [](ProjectorState& s) { s.input = "rgb1"; }},
+      {"resolution of the input was \"1920x1080\"",
+       [](ProjectorState& s) {
+         s.input_resolution = Resolution{1280, 720};
+       }},
       {"mute", [](ProjectorState& s) { s.muted = true; }},
       {"freeze", [](ProjectorState& s) { s.frozen = true; }},
       {"degamma", [](ProjectorState& s) { s.degamma = true; }},
@@ -63,6 +72,7 @@ TEST(ProjectorState, EveryChangeThatMovesColoursIsNamedAlone) {
        [](ProjectorState& s) {
          s.led_levels = LedLevels{100, 120, 91};
        }},
+      {"what lights the LEDs", [](ProjectorState& s) { s.led_enable = "red blue"; }},
       {"which lamps burn",
        [](ProjectorState& s) {
          s.lamps = {{1234, true}, {99, true}};
@@ -132,6 +142,17 @@ TEST(ProjectorState, WhatWasSoWhenItWasMeasuredIsNotWarnedOf) {
   // A record that says otherwise, or nothing, takes no warning away.
   EXPECT_EQ(warnings(then, to_record(whole_state())), warnings(then));
   EXPECT_EQ(warnings(then, {}), warnings(then));
+}
+
+TEST(ProjectorState, APictureThatIsScaledIsWarnedOfUnlessItWasMeasuredSo) {
+  ProjectorState scaled = whole_state();
+  scaled.input_resolution = Resolution{1280, 720};
+  EXPECT_THAT(warnings(scaled), ElementsAre(HasSubstr("1280 x 720 pixels to 1920 x 1080")));
+  EXPECT_THAT(warnings(scaled, to_record(scaled)), IsEmpty());
+  EXPECT_EQ(warnings(scaled, to_record(whole_state())).size(), 1U);
+  ProjectorState half_told = scaled;
+  half_told.panel_resolution.reset();
+  EXPECT_THAT(warnings(half_told), IsEmpty());
 }
 
 TEST(ProjectorState, NoRecordMakesAHiddenPictureRight) {

@@ -1,15 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The daemon as it is, with a tracker on a mocked USB bus that goes wrong in every way.
-#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <spawn.h>
-#include <sys/wait.h>
 
 #include <chrono>
-#include <csignal>
 #include <filesystem>
-#include <functional>
 #include <sstream>
 #include <string>
 #include <thread>
@@ -17,6 +12,7 @@
 #include "base/files.h"
 #include "base/random.h"
 #include "base/testing/temporary_folder.h"
+#include "tests/daemon_child.h"
 #include "tracking/testing/mock_liberty.h"
 
 namespace veneer {
@@ -24,76 +20,9 @@ namespace {
 
 namespace fs = std::filesystem;
 using std::chrono::milliseconds;
-using std::chrono::seconds;
 using ::testing::HasSubstr;
 using tracking::mock::Liberty;
 using tracking::mock::UsbDevice;
-
-/// Waits until `done`; false if that takes too long.
-bool wait_until(const std::function<bool()>& done, seconds patience = seconds(30)) {
-  const auto give_up = std::chrono::steady_clock::now() + patience;
-  while (!done()) {
-    if (std::chrono::steady_clock::now() > give_up) return false;
-    std::this_thread::sleep_for(milliseconds(5));
-  }
-  return true;
-}
-
-std::size_t count_entries(const fs::path& folder) {
-  return static_cast<std::size_t>(
-      std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
-}
-
-/// veneerd as a child; killed when it goes out of sight.
-class Daemon {
- public:
-  Daemon(const std::vector<std::string>& arguments, fs::path log) : log_(std::move(log)) {
-    std::vector<std::string> words{VENEER_PROGRAMS "/veneerd"};
-    words.insert(words.end(), arguments.begin(), arguments.end());
-    std::vector<char*> argv;
-    for (std::string& word : words) argv.push_back(word.data());
-    argv.push_back(nullptr);
-    posix_spawn_file_actions_t actions;
-    ::posix_spawn_file_actions_init(&actions);
-    constexpr int kMode = 0644;
-    ::posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
-    ::posix_spawn_file_actions_addopen(
-        &actions, 2, log_.c_str(), O_WRONLY | O_CREAT | O_TRUNC, kMode);
-    if (::posix_spawn(&pid_, argv[0], &actions, nullptr, argv.data(), environ) != 0) pid_ = -1;
-    ::posix_spawn_file_actions_destroy(&actions);
-  }
-  ~Daemon() {
-    if (pid_ <= 0) return;
-    ::kill(pid_, SIGKILL);
-    ::waitpid(pid_, nullptr, 0);
-  }
-  Daemon(const Daemon&) = delete;
-  Daemon& operator=(const Daemon&) = delete;
-
-  [[nodiscard]] bool runs() const { return pid_ > 0 && ::waitpid(pid_, nullptr, WNOHANG) == 0; }
-  /// Ends it as a person does; its exit code, or -1.
-  [[nodiscard]] int stop() {
-    ::kill(pid_, SIGTERM);
-    int status = 0;
-    const bool ended = wait_until([&] { return ::waitpid(pid_, &status, WNOHANG) == pid_; });
-    if (!ended) return -1;
-    pid_ = -1;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  }
-  [[nodiscard]] std::string log() const { return read_text(log_).value_or(""); }
-  [[nodiscard]] std::size_t descriptors() const { return count_entries(proc() / "fd"); }
-  [[nodiscard]] std::size_t threads() const { return count_entries(proc() / "task"); }
-  [[nodiscard]] double resident_mib() const {
-    const std::string status = read_text(proc() / "status").value_or("");
-    const std::size_t at = status.find("VmRSS:");
-    return at == std::string::npos ? 0 : std::stod(status.substr(at + 6)) / 1024;
-  }
-
- private:
-  [[nodiscard]] fs::path proc() const { return fs::path("/proc") / std::to_string(pid_); }
-  fs::path log_;
-  pid_t pid_ = -1;
-};
 
 /// After the last fault; a few frames, however busy the machine.
 constexpr milliseconds kRecovery(3000);

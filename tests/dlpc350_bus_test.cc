@@ -42,7 +42,18 @@ Bytes written(std::initializer_list<int> values) {
   return result;
 }
 
-enum class Fault { kNone, kNack, kSilence, kStrayFirst, kChatter, kBrokenLength, kShort, kUnplug };
+enum class Fault {
+  kNone,
+  kNack,
+  kNackRead,
+  kNackWrite,
+  kSilence,
+  kStrayFirst,
+  kChatter,
+  kBrokenLength,
+  kShort,
+  kUnplug
+};
 
 /// Holds values by command, and answers as the layout says.
 class Dlpc350Bus : public ::testing::Test {
@@ -79,9 +90,11 @@ class Dlpc350Bus : public ::testing::Test {
       const int command = at(5) + 256 * at(6);
       const bool is_read = (flags & 0x80) != 0;
       const Fault fault = faults_.contains(command) ? faults_[command] : Fault::kNone;
+      const bool refused =
+          fault == Fault::kNack || fault == (is_read ? Fault::kNackRead : Fault::kNackWrite);
       if (fault == Fault::kSilence) return;
       if (fault == Fault::kUnplug) unplug = true;
-      if (!is_read && fault == Fault::kNone) {
+      if (!is_read && (fault == Fault::kNone || fault == Fault::kNackRead)) {
         const int size = at(3) - 2;
         for (int i = 0; i < size; ++i) {
           auto& value = values_[command];
@@ -96,7 +109,7 @@ class Dlpc350Bus : public ::testing::Test {
         for (int i = 0; i < 100; ++i)
           replies.push_back(bytes({reply_flags, (sequence + 100) % 256, 1, 0, 0x77}, 64));
       Bytes reply = bytes({reply_flags, sequence}, 64);
-      if (fault == Fault::kNack || (is_read && !values_.contains(command))) {
+      if (refused || (is_read && !values_.contains(command))) {
         reply[0] |= std::byte{0x20};
       } else if (is_read) {
         const std::vector<int>& value = values_[command];
@@ -124,6 +137,10 @@ class Dlpc350Bus : public ::testing::Test {
   std::vector<int> value(int command) {
     const std::lock_guard lock(mutex_);
     return values_[command];
+  }
+  std::map<int, std::vector<int>> all_values() {
+    const std::lock_guard lock(mutex_);
+    return values_;
   }
   void set(int command, std::vector<int> value) {
     const std::lock_guard lock(mutex_);
@@ -163,6 +180,30 @@ TEST_F(Dlpc350Bus, EveryByteOfACommandIsAsLaidDown) {
                                 written({0x40, 4, 3, 0, 0x0E, 0x1A, 0x01}),
                                 written({0xC0, 5, 2, 0, 0x05, 0x1A}),
                                 written({0x40, 6, 5, 0, 0x01, 0x0B, 155, 135, 165})}));
+}
+
+TEST_F(Dlpc350Bus, EveryByteOfWhatIsReadFirstAndThenChangedIsAsLaidDown) {
+  device_.plug();
+  const auto engine = open();
+  ASSERT_TRUE(engine);
+  EXPECT_TRUE(engine->power(false));
+  EXPECT_TRUE(engine->mute(true));
+  EXPECT_TRUE(engine->mute(false));
+  EXPECT_TRUE(engine->select_input("flash"));
+  EXPECT_TRUE(engine->show_test_pattern("step-bars"));
+  EXPECT_TRUE(engine->set_processing(true));
+  EXPECT_EQ(take_received(),
+            (std::vector<Bytes>{written({0x40, 0, 3, 0, 0x00, 0x02, 1}),
+                                written({0xC0, 1, 2, 0, 0x07, 0x1A}),
+                                written({0x40, 2, 3, 0, 0x07, 0x1A, 0}),
+                                written({0xC0, 3, 2, 0, 0x07, 0x1A}),
+                                written({0x40, 4, 3, 0, 0x07, 0x1A, 0x08}),
+                                written({0xC0, 5, 2, 0, 0x00, 0x1A}),
+                                written({0x40, 6, 3, 0, 0x00, 0x1A, 0x0A}),
+                                written({0xC0, 7, 2, 0, 0x00, 0x1A}),
+                                written({0x40, 8, 3, 0, 0x00, 0x1A, 0x09}),
+                                written({0x40, 9, 3, 0, 0x03, 0x12, 0x0A}),
+                                written({0x40, 10, 3, 0, 0x1B, 0x1A, 0})}));
 }
 
 TEST_F(Dlpc350Bus, ItsWholeStateIsRead) {
@@ -243,7 +284,7 @@ TEST_F(Dlpc350Bus, ARefusalIsSaidOfACommandAndLeavesAStateEmpty) {
       {0x0B01, [](const auto& s) { return !s.led_levels; }},
       {0x1A00, [](const auto& s) { return !s.input; }},
       {0x1A05, [](const auto& s) { return !s.led_levels; }},
-      {0x1A07, [](const auto& s) { return !s.muted; }},
+      {0x1A07, [](const auto& s) { return !s.muted && !s.led_enable; }},
       {0x1A0A, [](const auto& s) { return s.health.empty(); }},
       {0x1A0C, [](const auto& s) { return !s.frozen && !s.degamma; }},
       {0x1A1B, [](const auto& s) { return !s.processing; }}};
@@ -253,6 +294,54 @@ TEST_F(Dlpc350Bus, ARefusalIsSaidOfACommandAndLeavesAStateEmpty) {
     ASSERT_TRUE(state) << state.error().what;
     EXPECT_TRUE(is_empty(*state)) << command;
     fault(command, Fault::kNone);
+  }
+}
+
+TEST_F(Dlpc350Bus, EveryRefusalOfEveryCommandIsToldAndChangesNothing) {
+  struct Refusal {
+    const char* named;
+    int command;
+    Fault fault;
+    std::function<Status(Dlpc350&)> act;
+  };
+  const auto mute = [](Dlpc350& e) { return e.mute(true); };
+  const auto input = [](Dlpc350& e) { return e.select_input("flash"); };
+  const auto degamma = [](Dlpc350& e) { return e.set_degamma(false); };
+  const auto levels = [](Dlpc350& e) { return e.set_led_levels({1, 2, 3}); };
+  const auto pattern = [](Dlpc350& e) { return e.show_test_pattern("grid"); };
+  const std::vector<Refusal> refusals{
+      {"0x0200", 0x0200, Fault::kNackWrite, [](Dlpc350& e) { return e.power(false); }},
+      {"0x0b01", 0x0B01, Fault::kNackWrite, levels},
+      {"0x100a", 0x100A, Fault::kNackWrite, [](Dlpc350& e) { return e.freeze(true); }},
+      {"0x1203", 0x1203, Fault::kNackWrite, pattern},
+      {"0x1a00", 0x1A00, Fault::kNackRead, input},
+      {"0x1a00", 0x1A00, Fault::kNackWrite, input},
+      {"0x1a00", 0x1A00, Fault::kNackRead, pattern},
+      {"0x1a00", 0x1A00, Fault::kNackWrite, pattern},
+      {"0x1a05", 0x1A05, Fault::kNackRead, levels},
+      {"0x1a07", 0x1A07, Fault::kNackRead, mute},
+      {"0x1a07", 0x1A07, Fault::kNackWrite, mute},
+      {"0x1a0e", 0x1A0E, Fault::kNackRead, degamma},
+      {"0x1a0e", 0x1A0E, Fault::kNackWrite, degamma},
+      {"0x1a1b", 0x1A1B, Fault::kNackWrite, [](Dlpc350& e) { return e.set_processing(false); }}};
+  device_.plug();
+  const auto engine = open();
+  ASSERT_TRUE(engine);
+  const auto values = all_values();
+  for (const Refusal& each : refusals) {
+    fault(each.command, each.fault);
+    const Status done = each.act(*engine);
+    ASSERT_FALSE(done) << each.named;
+    EXPECT_EQ(done.error().code, Errc::kUnavailable) << each.named;
+    EXPECT_THAT(done.error().what, HasSubstr(each.named));
+    EXPECT_EQ(all_values(), values) << each.named;
+    // No later command pays for it.
+    fault(each.command, Fault::kNone);
+    const Status again = each.act(*engine);
+    EXPECT_TRUE(again) << each.named << again.error().what;
+    EXPECT_NE(all_values(), values) << each.named;
+    const std::lock_guard lock(mutex_);
+    values_ = values;
   }
 }
 
@@ -311,6 +400,35 @@ TEST_F(Dlpc350Bus, MuteTakesTheLedsAndGivesThemBackAsTheyWere) {
     ASSERT_TRUE(engine->mute(false));
     EXPECT_EQ(value(0x1A07), std::vector<int>{enabled});
   }
+}
+
+TEST_F(Dlpc350Bus, WhatLitTheLedsIsNotLostWhereAnotherProgramUnblanks) {
+  device_.plug();
+  set(0x1A07, {0x05});
+  const auto before = open()->read_state();
+  ASSERT_TRUE(before) << before.error().what;
+  EXPECT_EQ(before->led_enable, "red blue");
+  const auto blank_and_unblank = [this] {
+    ASSERT_TRUE(open()->mute(true));
+    const auto dark = open()->read_state();
+    ASSERT_TRUE(dark) << dark.error().what;
+    EXPECT_EQ(dark->muted, true);
+    EXPECT_FALSE(dark->led_enable) << "nobody can tell while they are dark";
+    ASSERT_TRUE(open()->mute(false));
+  };
+  options_.led_enable = "red blue";
+  blank_and_unblank();
+  EXPECT_EQ(value(0x1A07), std::vector<int>{0x05});
+  EXPECT_TRUE(differences(*before, *open()->read_state()).empty());
+  // Where nobody says so, they are as after the device's start, and that is seen to be a change.
+  options_ = {};
+  blank_and_unblank();
+  EXPECT_EQ(value(0x1A07), std::vector<int>{0x08});
+  const auto changes = differences(*before, *open()->read_state());
+  ASSERT_EQ(changes.size(), 1U);
+  EXPECT_THAT(changes.front(), HasSubstr("\"red blue\" and is \"sequencer\""));
+  options_.led_enable = "all";
+  EXPECT_EQ(Dlpc350::open(options_, clock_).error().code, Errc::kInvalidOption);
 }
 
 TEST_F(Dlpc350Bus, ATestPatternTakesTheInputAndKeepsItsWidth) {
@@ -392,7 +510,8 @@ TEST_F(Dlpc350Bus, AWatchSeesItsLedsTurnedAndItPulledOutAndPutInAgain) {
 
 TEST_F(Dlpc350Bus, TheRegistryOpensIt) {
   device_.plug();
-  auto toml = TomlReader::parse("driver = \"dlpc350\"\nserial = \"LCR3\"", "test");
+  auto toml =
+      TomlReader::parse("driver = \"dlpc350\"\nserial = \"LCR3\"\nled_enable = \"red\"", "test");
   ASSERT_TRUE(toml);
   const auto control = open_control(*toml, clock_);
   ASSERT_TRUE(control) << control.error().what;

@@ -68,7 +68,7 @@ TEST_F(ProjectorProgram, SaysHowTheProjectorIs) {
   EXPECT_THAT(fake.conversations(),
               ElementsAre("5d8409bc1c3fa39749434aa3a5c38682%1CLSS ?\r%1POWR ?\r%2INPT ?\r"
                           "%1AVMT ?\r%1ERST ?\r%1LAMP ?\r%1INF1 ?\r%1INF2 ?\r%1NAME ?\r"
-                          "%2FREZ ?\r%2SNUM ?\r%2SVER ?\r"));
+                          "%2FREZ ?\r%2IRES ?\r%2RRES ?\r%2INNM ?31\r%2SNUM ?\r%2SVER ?\r"));
 }
 
 TEST_F(ProjectorProgram, EveryCommandIsSaidAsLaidDown) {

@@ -32,6 +32,7 @@ struct ProjectorOptions {
   std::optional<int> port;
   std::string password_file;
   std::string serial;
+  std::string led_enable;
   double watch_s = 0;
   std::string value;        // an input or a pattern
   std::vector<int> levels;  // of the LEDs
@@ -57,6 +58,7 @@ std::vector<std::string> settings_of(const ProjectorOptions& options) {
   if (!options.password_file.empty())
     add("password_file", std::filesystem::absolute(options.password_file).string());
   add("serial", options.serial);
+  add("led_enable", options.led_enable);
   if (options.port) settings.push_back(fmt::format("control.port = {}", *options.port));
   return settings;
 }
@@ -88,12 +90,19 @@ ordered_json json_of(const ProjectorControl& control, const ProjectorState& stat
     if (value) json[key] = *value;
   };
   put("input", state.input);
+  put("input_label", state.input_label);
+  const auto put_size = [&](const char* key, const std::optional<projector::Resolution>& size) {
+    if (size) json[key] = {size->width, size->height};
+  };
+  put_size("input_resolution", state.input_resolution);
+  put_size("panel_resolution", state.panel_resolution);
   put("muted", state.muted);
   put("frozen", state.frozen);
   put("locked", state.locked);
   put("degamma", state.degamma);
   put("processing", state.processing);
   put("led_levels", state.led_levels);
+  put("led_enable", state.led_enable);
   if (state.lamps) {
     json["lamps"] = ordered_json::array();
     for (const projector::Lamp& lamp : *state.lamps)
@@ -246,6 +255,8 @@ Result<int> run_projector(CommandLine& line) {
   app.add_option("--port", options.port, "Where 4352 is not it");
   app.add_option("--password-file", options.password_file, "Its first line is the password");
   app.add_option("--serial", options.serial, "Which one of several on USB");
+  app.add_option(
+      "--led-enable", options.led_enable, "What lights the LEDs after unblank: red blue");
   CLI::App* const asked =
       app.add_subcommand("status", "Say how it is, and what would spoil colours")->fallthrough();
   asked->add_option("--watch", options.watch_s, "Again every 2 s, for so many seconds")

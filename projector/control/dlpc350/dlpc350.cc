@@ -131,17 +131,22 @@ class Dlpc350::Device {
   ConnectedLightEngine engine_;
 };
 
-Dlpc350::Dlpc350(const Dlpc350Options& options, std::unique_ptr<Device> device, Clock& clock)
-    : options_(options), device_(std::move(device)), clock_(clock) {}
+Dlpc350::Dlpc350(const Dlpc350Options& options,
+                 std::uint8_t led_enable,
+                 std::unique_ptr<Device> device,
+                 Clock& clock)
+    : options_(options), device_(std::move(device)), clock_(clock), led_enable_(led_enable) {}
 Dlpc350::~Dlpc350() = default;
 
 Result<std::unique_ptr<Dlpc350>> Dlpc350::open(TomlReader& config, Clock& clock) {
   Dlpc350Options options;
   config.read("serial", options.serial);
+  config.read("led_enable", options.led_enable);
   return open(options, clock);
 }
 
 Result<std::unique_ptr<Dlpc350>> Dlpc350::open(const Dlpc350Options& options, Clock& clock) {
+  VENEER_ASSIGN(const std::uint8_t led_enable, dlpc350::led_enable_byte(options.led_enable));
   VENEER_ASSIGN(ConnectedLightEngine engine, choose(options.serial));
   HidHandle handle(hid_open_path(engine.node.c_str()));
   if (!handle && !engine.may_open)
@@ -154,7 +159,7 @@ Result<std::unique_ptr<Dlpc350>> Dlpc350::open(const Dlpc350Options& options, Cl
     return fail(
         Errc::kIo, "opening the DLPC350: {} does not open; plug it out and in again", engine.node);
   auto device = std::make_unique<Device>(std::move(handle), std::move(engine));
-  std::unique_ptr<Dlpc350> opened(new Dlpc350(options, std::move(device), clock));
+  std::unique_ptr<Dlpc350> opened(new Dlpc350(options, led_enable, std::move(device), clock));
   return opened;
 }
 
@@ -264,7 +269,11 @@ Result<ProjectorState> Dlpc350::read_state() {
     VENEER_ASSIGN(state.locked, dlpc350::read_lock(*signal));
   }
   VENEER_ASSIGN(const auto enabled, read_byte(Command::kLedEnable));
-  if (enabled) state.muted = (*enabled & 0x0FU) == 0;
+  if (enabled) {
+    const std::string lit_by = dlpc350::led_enable_name(*enabled);
+    state.muted = lit_by.empty();
+    if (!lit_by.empty()) state.led_enable = lit_by;
+  }
   VENEER_ASSIGN(const auto inverted, read_byte(Command::kPwmInvert));
   VENEER_ASSIGN(const auto currents, read(Command::kLedCurrent));
   if (inverted && currents) {
@@ -279,7 +288,7 @@ Status Dlpc350::power(bool on) {
 
 Status Dlpc350::mute(bool on) {
   VENEER_ASSIGN(const std::uint8_t now, require_byte(Command::kLedEnable));
-  const bool muted = (now & 0x0FU) == 0;
+  const bool muted = dlpc350::led_enable_name(now).empty();
   if (on == muted) return {};
   if (on) led_enable_ = now;
   return write(Command::kLedEnable, on ? std::uint8_t{0} : led_enable_);
@@ -312,8 +321,13 @@ Status Dlpc350::set_processing(bool on) {
 
 Status Dlpc350::show_test_pattern(const std::string& name) {
   VENEER_ASSIGN(const std::uint8_t pattern, dlpc350::test_pattern(name));
-  VENEER_TRY(select_input("test-pattern"));
-  return write(Command::kTestPattern, pattern);
+  VENEER_ASSIGN(const std::uint8_t before, require_byte(Command::kInputSource));
+  VENEER_ASSIGN(const std::uint8_t wanted, dlpc350::with_input(before, "test-pattern"));
+  VENEER_TRY(write(Command::kInputSource, wanted));
+  Status shown = write(Command::kTestPattern, pattern);
+  // It would go on with whatever pattern it had, in place of the picture.
+  if (!shown) static_cast<void>(write(Command::kInputSource, before));
+  return shown;
 }
 
 }  // namespace veneer::projector

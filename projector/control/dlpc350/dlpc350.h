@@ -20,6 +20,9 @@ namespace veneer::projector {
 
 struct Dlpc350Options {
   std::string serial;  ///< which one, where there are several
+  /// What lights the LEDs after a blank of which nobody here knows, as ProjectorState::led_enable
+  /// says it. The device forgets it while they are dark; after its start it is "sequencer".
+  std::string led_enable = "sequencer";
   /// For each message.
   Duration time_limit = std::chrono::seconds(2);
 };
@@ -37,8 +40,9 @@ struct ConnectedLightEngine {
 /// A DLPC350 over HID.
 class Dlpc350 final : public ProjectorControl {
  public:
-  /// Keys: serial. Opens the device. Errors: kNotFound (it is not there), kUnavailable (it may not
-  /// be opened), kInvalidOption (several are there), and those of a conversation.
+  /// Keys: serial, led_enable. Opens the device. Errors: kNotFound (it is not there), kUnavailable
+  /// (it may not be opened), kInvalidOption (several are there, or a wrong value), and those of a
+  /// conversation.
   [[nodiscard]] static Result<std::unique_ptr<Dlpc350>> open(TomlReader& config, Clock& clock);
   [[nodiscard]] static Result<std::unique_ptr<Dlpc350>> open(const Dlpc350Options& options,
                                                              Clock& clock);
@@ -48,19 +52,23 @@ class Dlpc350 final : public ProjectorControl {
   void interrupt() override { interrupted_ = true; }
   [[nodiscard]] Result<ProjectorState> read_state() override;
   [[nodiscard]] Status power(bool on) override;
-  /// Switches its LEDs off: black mirrors still leak light.
+  /// Switches its LEDs off: black mirrors still leak light. They come back as they were where this
+  /// object switched them off, else by the option led_enable.
   [[nodiscard]] Status mute(bool on) override;
   [[nodiscard]] Status freeze(bool on) override;
   [[nodiscard]] Status select_input(const std::string& input) override;
   [[nodiscard]] Status set_degamma(bool on) override;
   [[nodiscard]] Status set_led_levels(const LedLevels& levels) override;
   [[nodiscard]] Status set_processing(bool on) override;
-  /// Selects the input "test-pattern" too.
+  /// Selects the input "test-pattern" too, and goes back to the one of before where it is refused.
   [[nodiscard]] Status show_test_pattern(const std::string& name) override;
 
  private:
   class Device;
-  Dlpc350(const Dlpc350Options& options, std::unique_ptr<Device> device, Clock& clock);
+  Dlpc350(const Dlpc350Options& options,
+          std::uint8_t led_enable,
+          std::unique_ptr<Device> device,
+          Clock& clock);
   /// Empty where the device refuses (NACK).
   [[nodiscard]] Result<std::optional<dlpc350::Bytes>> exchange(
       dlpc350::Command command, const std::vector<dlpc350::Report>& request, bool is_read);
@@ -76,7 +84,7 @@ class Dlpc350 final : public ProjectorControl {
   Clock& clock_;
   std::atomic<bool> interrupted_{false};
   std::uint8_t sequence_ = 0;
-  std::uint8_t led_enable_ = dlpc350::kSequencerControl;  // to come back to from mute
+  std::uint8_t led_enable_;  // to come back to from mute
 };
 
 }  // namespace veneer::projector

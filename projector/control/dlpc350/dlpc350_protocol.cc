@@ -11,6 +11,9 @@ constexpr std::uint8_t kReplyWanted = 0x40;
 constexpr std::uint8_t kNack = 0x20;
 constexpr std::size_t kVideoSignalSize = 28;
 constexpr std::array<std::string_view, 4> kInputs{"parallel", "test-pattern", "flash", "fpd-link"};
+/// By their bits of kLedEnable.
+constexpr std::array<std::string_view, 3> kLeds{"red", "green", "blue"};
+constexpr std::string_view kSequencer = "sequencer";
 /// Names from memory of TI's programmer's guide; the two ends are in the sources.
 constexpr std::array<std::string_view, 11> kPatterns{"solid",
                                                      "horizontal-ramp",
@@ -148,6 +151,34 @@ Result<std::array<std::byte, 3>> led_parameters(const LedLevels& levels, bool in
     parameters.at(i) = static_cast<std::byte>(inverted ? level : 255 - level);
   }
   return parameters;
+}
+
+std::string led_enable_name(std::uint8_t enabled) {
+  // What the other bits say is not heeded then.
+  if ((enabled & kSequencerControl) != 0) return std::string(kSequencer);
+  std::string name;
+  for (std::size_t i = 0; i < kLeds.size(); ++i)
+    if ((enabled & (1U << i)) != 0)
+      name += fmt::format("{}{}", name.empty() ? "" : " ", kLeds.at(i));
+  return name;
+}
+
+Result<std::uint8_t> led_enable_byte(std::string_view name) {
+  if (name == kSequencer) return kSequencerControl;
+  unsigned byte = 0;
+  std::string_view rest = name;
+  while (true) {
+    const std::size_t end = std::min(rest.find(' '), rest.size());
+    const auto led = std::ranges::find(kLeds, rest.substr(0, end));
+    if (led == kLeds.end())
+      return fail(Errc::kInvalidOption,
+                  "commanding a DLPC350: nothing called \"{}\" lights its LEDs; write "
+                  "\"sequencer\", or those that are lit by hand, as \"red blue\"",
+                  name);
+    byte |= 1U << static_cast<unsigned>(led - kLeds.begin());
+    if (end == rest.size()) return static_cast<std::uint8_t>(byte);
+    rest.remove_prefix(end + 1);
+  }
 }
 
 std::string_view input_name(std::uint8_t source) {

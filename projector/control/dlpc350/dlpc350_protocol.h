@@ -97,6 +97,10 @@ struct MainStatus {
 [[nodiscard]] Health health_of(std::uint8_t hardware, std::uint8_t system);
 
 inline constexpr std::uint8_t kSequencerControl = 0x08;  ///< of kLedEnable
+/// "sequencer", or those that are lit by hand, as "red blue"; empty for none.
+[[nodiscard]] std::string led_enable_name(std::uint8_t enabled);
+/// The byte for such a name; colours in any order. Errors: kInvalidOption, for none of them too.
+[[nodiscard]] Result<std::uint8_t> led_enable_byte(std::string_view name);
 [[nodiscard]] constexpr std::uint8_t with_degamma(std::uint8_t gamma, bool on) {
   return static_cast<std::uint8_t>((gamma & 0x7FU) | (on ? 0x80U : 0U));
 }

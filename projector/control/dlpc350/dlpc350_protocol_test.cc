@@ -153,5 +153,27 @@ TEST(Dlpc350Protocol, StatusBitsAreApart) {
   EXPECT_EQ(health_of(0x09, 0x01), Health::kWarning);
 }
 
+TEST(Dlpc350Protocol, WhatLightsTheLedsComesBackFromItsName) {
+  for (int byte = 0; byte < 256; ++byte) {
+    const std::string name = led_enable_name(static_cast<std::uint8_t>(byte));
+    if ((byte & 0x0F) == 0) {
+      EXPECT_EQ(name, "");
+      continue;
+    }
+    const auto again = led_enable_byte(name);
+    ASSERT_TRUE(again) << name;
+    // The sequencer's bit leaves the others without a meaning, and so are bits 4 to 7.
+    EXPECT_EQ(*again, (byte & 0x08) != 0 ? 0x08 : byte & 0x07) << name;
+  }
+  EXPECT_EQ(led_enable_name(0x05), "red blue");
+  EXPECT_EQ(led_enable_byte("blue red"), std::uint8_t{0x05});
+  for (const char* wrong :
+       {"", " ", "red ", " red", "red  blue", "Red", "sequencer red", "white"}) {
+    const auto byte = led_enable_byte(wrong);
+    ASSERT_FALSE(byte) << wrong;
+    EXPECT_EQ(byte.error().code, Errc::kInvalidOption);
+  }
+}
+
 }  // namespace
 }  // namespace veneer::projector::dlpc350

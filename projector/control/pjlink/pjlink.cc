@@ -220,6 +220,16 @@ Result<ProjectorState> Pjlink::ask_for_everything() {
   if (frozen) {
     VENEER_ASSIGN(state.frozen, pjlink::read_flag(*frozen));
   }
+  VENEER_ASSIGN(const Answer incoming, ask_if_known({2, "IRES", "?"}, state));
+  if (incoming) state.input_resolution = pjlink::read_resolution(*incoming);
+  if (state.input_resolution) state.locked = true;
+  if (incoming == pjlink::kNoSignal && state.power == Power::kOn) state.locked = false;
+  VENEER_ASSIGN(const Answer panel, ask_if_known({2, "RRES", "?"}, state));
+  if (panel) state.panel_resolution = pjlink::read_resolution(*panel);
+  if (input) {
+    VENEER_ASSIGN(const Answer label, ask_if_known({2, "INNM", "?" + *input}, state));
+    if (label && !label->empty()) state.input_label = pjlink::readable(*label);
+  }
   VENEER_TRY(read_text(2, "SNUM", state.serial));
   VENEER_TRY(read_text(2, "SVER", state.firmware));
   return state;

@@ -34,6 +34,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto health = pjlink::read_health(parameter);
   has_text(health);
   if (health) law(health->size() == 6, "health of other than six parts");
+  const auto size_told = pjlink::read_resolution(parameter);
+  if (size_told) law(size_told->width > 0 && size_told->height > 0, "a picture without pixels");
   has_text(pjlink::read_power(parameter));
   has_text(pjlink::read_mute(parameter));
   has_text(pjlink::read_flag(parameter));

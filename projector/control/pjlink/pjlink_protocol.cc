@@ -173,6 +173,21 @@ Result<std::vector<Lamp>> read_lamps(std::string_view parameter) {
   return not_understood("the lamps", parameter);
 }
 
+std::optional<Resolution> read_resolution(std::string_view parameter) {
+  constexpr std::size_t kMostDigits = 5;
+  const auto number_of = [](std::string_view text) {
+    int value = 0;
+    if (!text.empty() && text.size() <= kMostDigits && std::ranges::all_of(text, is_digit))
+      std::from_chars(text.data(), text.data() + text.size(), value);
+    return value;
+  };
+  const std::size_t cross = parameter.find('x');
+  if (cross == std::string_view::npos) return std::nullopt;
+  const Resolution size{number_of(parameter.substr(0, cross)),
+                        number_of(parameter.substr(cross + 1))};
+  return size.width > 0 && size.height > 0 ? std::optional(size) : std::nullopt;
+}
+
 Result<bool> read_flag(std::string_view parameter) {
   if (parameter == "0") return false;
   if (parameter == "1") return true;

@@ -63,6 +63,11 @@ struct Reply {
 [[nodiscard]] Result<std::map<std::string, Health>> read_health(std::string_view parameter);
 /// "1234 1 99 0": hours and whether it burns, 1 to 8 lamps.
 [[nodiscard]] Result<std::vector<Lamp>> read_lamps(std::string_view parameter);
+/// "1920x1080", of an input (IRES) or the panel (RRES). Nothing for all else: how these look is
+/// from memory, and one that looks otherwise must not cost the rest of the state.
+[[nodiscard]] std::optional<Resolution> read_resolution(std::string_view parameter);
+/// What IRES says where nothing comes in.
+inline constexpr std::string_view kNoSignal = "-";
 [[nodiscard]] Result<bool> read_flag(std::string_view parameter);
 
 /// "31" as "digital1". Errors: kBadFormat.

@@ -131,6 +131,27 @@ TEST(PjlinkProtocol, NamesOfInputsAndTheirCodesAreOne) {
     EXPECT_EQ(input_code(name).error().code, Errc::kInvalidOption) << name;
 }
 
+TEST(PjlinkProtocol, AResolutionIsTwoNumbersAndNothingElse) {
+  EXPECT_EQ(read_resolution("1920x1080"), (Resolution{1920, 1080}));
+  EXPECT_EQ(read_resolution("1x99999"), (Resolution{1, 99999}));
+  for (const char* text : {"",
+                           "-",
+                           "*",
+                           "x",
+                           "1920x",
+                           "x1080",
+                           "0x1080",
+                           "1920x0",
+                           "1920X1080",
+                           "1920x1080x2",
+                           "1920 x 1080",
+                           "-1x5",
+                           "+1x5",
+                           "1920x1080p",
+                           "100000x1"})
+    EXPECT_FALSE(read_resolution(text)) << text;
+}
+
 TEST(PjlinkProtocol, TextsForPeopleAreUtf8) {
   EXPECT_EQ(readable("Hall 3"), "Hall 3");
   EXPECT_EQ(readable("S\xc3\xa4"

@@ -45,9 +45,16 @@ FakeProjector::Behaviour class_2() {
   behaviour.replies["%2INPT ?\r"] = "%2INPT=3A\r";
   behaviour.replies["%2FREZ ?\r"] = "%2FREZ=1\r";
   behaviour.replies["%2FREZ 0\r"] = "%2FREZ=OK\r";
+  behaviour.replies["%2IRES ?\r"] = "%2IRES=1280x720\r";
+  behaviour.replies["%2RRES ?\r"] = "%2RRES=1920x1080\r";
+  behaviour.replies["%2INNM ?3A\r"] = "%2INNM=HDMI left\r";
   behaviour.replies["%2SNUM ?\r"] = "%2SNUM=S123\r";
   behaviour.replies["%2SVER ?\r"] = "%2SVER=1.02\r";
   return behaviour;
+}
+
+std::string reply_to(const std::string& request, const std::string& parameter) {
+  return request.substr(0, 6) + "=" + parameter + "\r";
 }
 
 constexpr const char* kAllOfClass1 =
@@ -99,8 +106,33 @@ TEST_F(PjlinkConversation, Class2IsAskedForWhatClass1DoesNotKnow) {
   EXPECT_EQ(state->frozen, true);
   EXPECT_EQ(state->serial, "S123");
   EXPECT_EQ(state->firmware, "1.02");
+  EXPECT_EQ(state->input_label, "HDMI left");
+  EXPECT_EQ(state->input_resolution, (Resolution{1280, 720}));
+  EXPECT_EQ(state->panel_resolution, (Resolution{1920, 1080}));
+  EXPECT_EQ(state->locked, true);
   EXPECT_TRUE(control.freeze(false));
-  EXPECT_THAT(projector.conversations().front(), ::testing::EndsWith("%2SVER ?\r%2FREZ 0\r"));
+  EXPECT_THAT(projector.conversations().front(),
+              ::testing::EndsWith("%2FREZ ?\r%2IRES ?\r%2RRES ?\r%2INNM ?3A\r%2SNUM ?\r%2SVER ?\r"
+                                  "%2FREZ 0\r"));
+}
+
+TEST_F(PjlinkConversation, NoSignalIsToldApartFromOneThatIsNotKnown) {
+  FakeProjector projector(class_2());
+  for (const auto& [answer, locked] : {std::pair{"-", std::optional(false)},
+                                       std::pair{"*", std::optional<bool>()},
+                                       std::pair{"ERR3", std::optional<bool>()}}) {
+    projector.reply("%2IRES ?\r", reply_to("%2IRES ?", answer));
+    const auto state = this->control(projector).read_state();
+    ASSERT_TRUE(state) << state.error().what;
+    EXPECT_EQ(state->locked, locked) << answer;
+    EXPECT_FALSE(state->input_resolution) << answer;
+  }
+  // One that is off has no signal either, which is nothing to see to.
+  projector.reply("%2IRES ?\r", "%2IRES=-\r");
+  projector.reply("%1POWR ?\r", "%1POWR=0\r");
+  const auto off = this->control(projector).read_state();
+  ASSERT_TRUE(off) << off.error().what;
+  EXPECT_FALSE(off->locked);
 }
 
 TEST_F(PjlinkConversation, ThePasswordGoesBeforeTheFirstRequestAlone) {
@@ -166,12 +198,11 @@ constexpr std::array kAsked{
     Asked{"%1INF2 ?", [](const ProjectorState& s) { return !s.model; }},
     Asked{"%1NAME ?", [](const ProjectorState& s) { return !s.name; }},
     Asked{"%2FREZ ?", [](const ProjectorState& s) { return !s.frozen; }},
+    Asked{"%2IRES ?", [](const ProjectorState& s) { return !s.input_resolution; }},
+    Asked{"%2RRES ?", [](const ProjectorState& s) { return !s.panel_resolution; }},
+    Asked{"%2INNM ?3A", [](const ProjectorState& s) { return !s.input_label; }},
     Asked{"%2SNUM ?", [](const ProjectorState& s) { return !s.serial; }},
     Asked{"%2SVER ?", [](const ProjectorState& s) { return !s.firmware; }}};
-
-std::string reply_to(const std::string& request, const std::string& parameter) {
-  return request.substr(0, 6) + "=" + parameter + "\r";
-}
 
 TEST_F(PjlinkConversation, EveryRefusalOfEveryQuestionLeavesThatOneValueEmpty) {
   for (const Asked& asked : kAsked) {
@@ -182,7 +213,10 @@ TEST_F(PjlinkConversation, EveryRefusalOfEveryQuestionLeavesThatOneValueEmpty) {
       const auto state = this->control(projector).read_state();
       ASSERT_TRUE(state) << request << " " << state.error().what;
       for (const Asked& other : kAsked)
-        EXPECT_EQ(other.is_empty(*state), other.request == asked.request)
+        EXPECT_EQ(other.is_empty(*state),
+                  other.request == asked.request ||
+                      // What is not known cannot be asked for its name.
+                      (other.request == std::string("%2INNM ?3A") && request == "%2INPT ?"))
             << other.request << " beside " << request;
       const bool failed =
           state->health.contains("other") && state->health.at("other") == Health::kError;
@@ -192,8 +226,11 @@ TEST_F(PjlinkConversation, EveryRefusalOfEveryQuestionLeavesThatOneValueEmpty) {
       projector.reply(request + "\r", reply_to(request, wrong));
       const auto state = this->control(projector).read_state();
       // Names are texts, and a projector may well be called ERR5.
-      const bool is_text = request.find("INF") == 2 || request.find("NAME") == 2 ||
-                           request.find("SNUM") == 2 || request.find("SVER") == 2;
+      // What is no resolution is none.
+      const bool is_text = request.find("IRES") == 2 || request.find("RRES") == 2 ||
+                           request.find("INNM") == 2 || request.find("INF") == 2 ||
+                           request.find("NAME") == 2 || request.find("SNUM") == 2 ||
+                           request.find("SVER") == 2;
       if (is_text && std::string(wrong) != "ERRA") {
         EXPECT_TRUE(state) << request << wrong;
         continue;
