@@ -465,8 +465,9 @@ Result<RunRecord> FrameLoop::run(const std::atomic<bool>& stop, Progress& progre
   if (frames > 0) progress.finish({});
   run_.seconds = milliseconds_since(begin) * 1e-3;
   if (seen_ > kRememberedFrames) {
-    std::ranges::rotate(
-        run_.frames, run_.frames.begin() + static_cast<std::ptrdiff_t>(seen_ % kRememberedFrames));
+    std::rotate(run_.frames.begin(),
+                run_.frames.begin() + static_cast<std::ptrdiff_t>(seen_ % kRememberedFrames),
+                run_.frames.end());
   }
   parts_.faults.stopping();
   // Somebody asked for these frames and is to know that he does not have them.

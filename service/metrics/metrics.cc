@@ -104,8 +104,9 @@ std::vector<MetricFamily> families_of(const ServiceStatus& status) {
   families.push_back(one_gauge("veneer_quality_rung",
                                "How far down the ladder the picture is drawn; 0 is the best",
                                status.quality_rung));
-  families.push_back(one_counter(
-      "veneer_frames_total", "Frames that went out since the start, dark ones included", status.frames));
+  families.push_back(one_counter("veneer_frames_total",
+                                 "Frames that went out since the start, dark ones included",
+                                 status.frames));
   families.push_back(one_counter(
       "veneer_frames_dropped_total", "Refreshes for which no frame was ready", status.dropped));
   families.push_back(one_counter(
