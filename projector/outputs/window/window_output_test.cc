@@ -6,6 +6,7 @@
 #include <SDL.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -35,6 +36,7 @@ class XServer {
     if (::pipe(ends.data()) != 0) return;
     child_ = ::fork();
     if (child_ == 0) {
+      ::prctl(PR_SET_PDEATHSIG, SIGTERM);  // never outlives a test that crashed
       ::close(ends[0]);
       const std::string fd = std::to_string(ends[1]);
       const std::string screen = fmt::format("{}x{}x24", kWidth, kHeight);
@@ -112,6 +114,7 @@ class WaylandCompositor {
     ::setenv("XDG_RUNTIME_DIR", folder_.path().c_str(), 1);
     child_ = ::fork();
     if (child_ == 0) {
+      ::prctl(PR_SET_PDEATHSIG, SIGTERM);
       const std::string width = fmt::format("--width={}", kWidth);
       const std::string height = fmt::format("--height={}", kHeight);
       const std::string log = fmt::format("--log={}", (folder_.path() / "log").string());
