@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/exit_code.h"
+#include "base/testing/browser.h"
 #include "tests/program.h"
 
 namespace veneer {
@@ -59,6 +60,24 @@ INSTANTIATE_TEST_SUITE_P(All, ShippedScenario, testing::ValuesIn(shipped()), [](
   std::ranges::replace(name, '-', '_');
   return name;
 });
+
+TEST(HarnessPage, DrawsACurveOfEachQuantityWithoutAFault) {
+  if (!has_browser()) GTEST_SKIP() << kNoBrowser;
+  const std::string name = shipped().front();
+  const Outcome outcome = harness(scenario(name));
+  ASSERT_EQ(outcome.exit_code, kExitDone) << outcome.out << outcome.err;
+  const auto page = read_text(folder() / name / "index.html");
+  ASSERT_TRUE(page) << page.error().what;
+  const auto seen =
+      seen_in_browser(*page,
+                      "return { curves: document.querySelectorAll('#curves polyline').length,"
+                      " titles: document.querySelectorAll('#curves h2').length };");
+  ASSERT_TRUE(seen) << seen.error().what;
+  const json found = json::parse(*seen);
+  EXPECT_EQ(found.at("faults"), json::array());
+  EXPECT_GE(found.at("found").at("curves"), 3);
+  EXPECT_EQ(found.at("found").at("curves"), found.at("found").at("titles"));
+}
 
 TEST(Scenarios, AreTenOrMore) { EXPECT_GE(shipped().size(), 10U); }
 

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "base/random.h"
+#include "base/testing/browser.h"
 #include "calibration/exchange/cube.h"
 #include "calibration/profile.h"
 #include "tests/program.h"
@@ -77,6 +78,21 @@ TEST_F(WizardTest, LeavesAProfileItsFilesAndAReportAndNoSession) {
   EXPECT_EQ(page.find("{{DATA}}"), std::string::npos);
   EXPECT_EQ(page.find("http://"), page.find("http://www.w3.org"))
       << "the page asks for the network";
+}
+
+TEST_F(WizardTest, ItsReportDrawsInABrowserWithoutAFault) {
+  if (!has_browser()) GTEST_SKIP() << kNoBrowser;
+  const auto seen = seen_in_browser(read_text(at("good") / "report.html").value(),
+                                    "return { steps: document.querySelectorAll('#steps tr').length,"
+                                    " curves: document.querySelectorAll('svg path').length,"
+                                    " ticks: document.querySelectorAll('svg text').length };");
+  ASSERT_TRUE(seen) << seen.error().what;
+  const json page = json::parse(*seen);
+  EXPECT_EQ(page.at("faults"), json::array());
+  const json report = json::parse(read_text(at("good") / "report.json").value());
+  EXPECT_EQ(page.at("found").at("steps"), report.at("steps").size());
+  EXPECT_GE(page.at("found").at("curves"), 3);  // a tone curve for each primary
+  EXPECT_GE(page.at("found").at("ticks"), 10);
 }
 
 // Killed at any moment, as often as one likes: the old profile stays good, and in the end there is

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/files.h"
+#include "base/testing/browser.h"
 #include "base/testing/temporary_folder.h"
 
 namespace veneer::cli {
@@ -88,6 +89,15 @@ TEST(Report, IsOnePageWhoseDataCannotEndTheScript) {
   EXPECT_EQ(page.find("{{DATA}}"), std::string::npos);
   EXPECT_EQ(nlohmann::json::parse(read_text(folder.path() / "report.json").value()).at("material"),
             "</script><b>");
+  if (!has_browser()) GTEST_SKIP() << kNoBrowser;
+  const auto seen = seen_in_browser(
+      page, "return [...document.querySelectorAll('polyline')].map(l => l.points.length);");
+  ASSERT_TRUE(seen) << seen.error().what;
+  const nlohmann::json found = nlohmann::json::parse(*seen);
+  EXPECT_EQ(found.at("found"), nlohmann::json({2, 2, 2})) << *seen;
+  for (const auto& fault :
+       found.at("faults"))  // the pictures, which lie beside it, are refused here
+    EXPECT_NE(fault.get<std::string>().find("file"), std::string::npos) << fault;
 }
 
 }  // namespace
