@@ -171,7 +171,8 @@ TEST_F(RealTimeDaemonTest, TellsItsFiguresWhileItRuns) {
   const auto status = daemon_->status();
   EXPECT_GT(status.frame_rate_hz, 20);
   EXPECT_LE(status.frame_rate_hz, 202);
-  EXPECT_NEAR(status.latency_ms.gpu_draw, 0.3, 1e-9);
+  EXPECT_GE(status.latency_ms.gpu_draw, 0.3 - 1e-9)
+      << "what the GPU says, and more where one waited";
   EXPECT_NEAR(status.gpu_ms_median, 0.5, 1e-9);
   EXPECT_GE(status.latency_ms.hand_off, 0);
   EXPECT_NE(status.material.find("phong"), std::string::npos) << status.material;

@@ -167,7 +167,9 @@ TEST_F(FrameLoopTest, SaysWhereTheTimeFromPoseToLightWent) {
     EXPECT_EQ(frame.latency_ms.hand_off, 0);
     EXPECT_GE(frame.latency_ms.wait, 0);
     EXPECT_LT(frame.latency_ms.wait, 4) << "the tracker's interval";
-    EXPECT_EQ(frame.latency_ms.gpu_draw, 0.3);
+    // Less than was waited for it cannot be.
+    EXPECT_GE(frame.latency_ms.gpu_draw, 0.3);
+    EXPECT_LE(frame.latency_ms.gpu_draw, std::max(0.3, frame.frame_ms));
     EXPECT_NEAR(frame.latency_ms.compensate, 0.2, 1e-12);
     EXPECT_NEAR(frame.latency_ms.display, 10, 1e-9);
   }
