@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "base/files.h"
+#include "base/testing/temporary_folder.h"
 
 namespace veneer::daemon {
 namespace {
@@ -17,16 +18,14 @@ using testing::Not;
 
 class FirstStart : public testing::Test {
  protected:
-  FirstStart() : folder_(fs::path(testing::TempDir()) / "veneer_first_start_test") {
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
+  FirstStart() {
     config_.scene = folder_ / "scene.toml";
     config_.material = folder_ / "material.safetensors";
     config_.profile = folder_ / "profile";
   }
-  ~FirstStart() override { fs::remove_all(folder_); }
 
-  fs::path folder_;
+  TemporaryFolder temporary_;
+  fs::path folder_ = temporary_.path();
   Config config_;
 };
 

@@ -8,6 +8,7 @@
 #include <map>
 #include <string>
 
+#include "base/testing/temporary_folder.h"
 #include "tracking/recording.h"
 
 namespace veneer::tracking {
@@ -67,7 +68,6 @@ class TrackerContract : public ::testing::TestWithParam<DriverCase> {
     ASSERT_TRUE(tracker) << tracker.error().what;
     tracker_ = *std::move(tracker);
   }
-  void TearDown() override { std::filesystem::remove(file_); }
 
   void record() {
     VirtualClock clock;
@@ -78,7 +78,8 @@ class TrackerContract : public ::testing::TestWithParam<DriverCase> {
       ASSERT_TRUE(recorder->write((*source)->wait_pose(seconds(1)).value()));
   }
 
-  std::string file_ = ::testing::TempDir() + "veneer_contract_" + GetParam().name + ".jsonl";
+  TemporaryFolder folder_;
+  std::string file_ = folder_.path() / "poses.jsonl";
   VirtualClock clock_{Time{seconds(50)}};
   std::unique_ptr<Tracker> tracker_;
 };

@@ -11,6 +11,7 @@
 
 #include "base/files.h"
 #include "base/random.h"
+#include "base/testing/temporary_folder.h"
 
 namespace veneer::tracking {
 namespace {
@@ -20,10 +21,6 @@ const std::string kLine = "{\"t_ns\":5,\"body\":1,\"seq\":2,\"p\":[1,2,3],\"q\":
 
 class RecordingTest : public ::testing::Test {
  protected:
-  RecordingTest()
-      : folder_(::testing::TempDir() + "veneer_recording_test"), path_(folder_ / "poses.jsonl") {}
-  ~RecordingTest() override { std::filesystem::remove_all(folder_); }
-
   struct Contents {
     std::vector<PoseSample> samples;
     bool truncated = false;
@@ -44,8 +41,9 @@ class RecordingTest : public ::testing::Test {
     return read();
   }
 
-  std::filesystem::path folder_;
-  std::filesystem::path path_;
+  TemporaryFolder temporary_;
+  std::filesystem::path folder_ = temporary_.path() / "poses";  // not there yet
+  std::filesystem::path path_ = folder_ / "poses.jsonl";
 };
 
 bool same_bits(double a, double b) {

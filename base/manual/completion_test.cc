@@ -12,6 +12,7 @@
 
 #include "base/files.h"
 #include "base/manual/internal_test_app.h"
+#include "base/testing/temporary_folder.h"
 
 namespace veneer::manual {
 namespace {
@@ -25,8 +26,8 @@ using testing::Not;
 /// What a real bash offers for the last of `words`.
 std::vector<std::string> completed(const std::string& words) {
   const TestApp test;
-  const std::filesystem::path script =
-      std::filesystem::path(testing::TempDir()) / "veneer_completion_test.bash";
+  const TemporaryFolder folder;
+  const std::filesystem::path script = folder.path() / "fence.bash";
   EXPECT_TRUE(write_text(script, bash_completion(usage_of(test.app, "fence"))).has_value());
   const std::string command = "bash --norc -uc 'source " + script.string() + "; COMP_WORDS=(" +
                               words +
@@ -41,7 +42,6 @@ std::vector<std::string> completed(const std::string& words) {
     if (!text.empty()) lines.push_back(text);
   }
   EXPECT_EQ(::pclose(pipe), 0) << command;
-  std::filesystem::remove(script);
   return lines;
 }
 

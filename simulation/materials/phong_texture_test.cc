@@ -2,7 +2,6 @@
 #include "simulation/materials/phong_texture.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -10,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "base/testing/temporary_folder.h"
 #include "btf/sample_set.h"
 #include "simulation/materials/internal_test_fields.h"
 
@@ -103,13 +103,8 @@ TEST(PhongTexture, HasAllHuesAndDependsOnTheSeed) {
 
 class PhongSetTest : public testing::Test {
  protected:
-  PhongSetTest() : folder_(fs::path(testing::TempDir()) / ("phong_" + std::to_string(::getpid()))) {
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  ~PhongSetTest() override { fs::remove_all(folder_); }
-
-  fs::path folder_;
+  TemporaryFolder temporary_;
+  fs::path folder_ = temporary_.path();
 };
 
 TEST_F(PhongSetTest, HoldsTheFormulaAtEveryTexelAndPair) {

@@ -3,7 +3,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -14,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "base/testing/temporary_folder.h"
 #include "btf/sample_set.h"
 #include "simulation/materials/internal_test_fields.h"
 
@@ -24,15 +24,10 @@ namespace fs = std::filesystem;
 
 class SynthesizeTest : public testing::Test {
  protected:
-  SynthesizeTest()
-      : folder_(fs::path(testing::TempDir()) / ("synthesize_" + std::to_string(::getpid()))) {
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  ~SynthesizeTest() override { fs::remove_all(folder_); }
   [[nodiscard]] bool left_behind() const { return !fs::is_empty(folder_); }
 
-  fs::path folder_;
+  TemporaryFolder temporary_;
+  fs::path folder_ = temporary_.path();
 };
 
 SynthesisOptions quick_options() {

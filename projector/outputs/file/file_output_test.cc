@@ -12,6 +12,7 @@
 #include "base/files.h"
 #include "base/image_files.h"
 #include "base/random.h"
+#include "base/testing/temporary_folder.h"
 
 namespace veneer::projector {
 namespace {
@@ -25,11 +26,6 @@ struct OwnedFrame {
 
 class FileOutputTest : public ::testing::Test {
  protected:
-  FileOutputTest() : folder_(::testing::TempDir() + "veneer_file_output_test") {
-    std::filesystem::remove_all(folder_);
-  }
-  ~FileOutputTest() override { std::filesystem::remove_all(folder_); }
-
   Result<std::unique_ptr<FileOutput>> open(const std::string& more = "") {
     VENEER_ASSIGN(
         TomlReader toml,
@@ -48,7 +44,8 @@ class FileOutputTest : public ::testing::Test {
     return static_cast<int>(std::distance(std::filesystem::directory_iterator(folder_), {}));
   }
 
-  std::filesystem::path folder_;
+  TemporaryFolder temporary_;
+  std::filesystem::path folder_ = temporary_.path() / "frames";  // not there yet
 };
 
 OwnedFrame make_frame(std::uint64_t number, int bits, int width = 7, int height = 5) {

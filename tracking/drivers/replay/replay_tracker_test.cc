@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/files.h"
+#include "base/testing/temporary_folder.h"
 
 namespace veneer::tracking {
 namespace {
@@ -16,10 +17,6 @@ using std::chrono::milliseconds;
 
 class ReplayTrackerTest : public ::testing::Test {
  protected:
-  ReplayTrackerTest()
-      : folder_(::testing::TempDir() + "veneer_replay_test"), file_(folder_ / "poses.jsonl") {}
-  ~ReplayTrackerTest() override { std::filesystem::remove_all(folder_); }
-
   /// Records body 1 at 0, 10, 30 ms, from 5 s and sequence number 40 on.
   void record() const {
     auto recorder = PoseRecorder::create(file_);
@@ -41,8 +38,8 @@ class ReplayTrackerTest : public ::testing::Test {
     return tracker;
   }
 
-  std::filesystem::path folder_;
-  std::filesystem::path file_;
+  TemporaryFolder folder_;
+  std::filesystem::path file_ = folder_.path() / "poses.jsonl";
   VirtualClock clock_{Time{std::chrono::seconds(100)}};
 };
 
