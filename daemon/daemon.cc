@@ -204,14 +204,13 @@ Result<Summary> TheDaemon::run(const std::atomic<bool>& stop, Progress& progress
   faults_.stopping();
   stage.loader.stop(loop.take_show());
   housekeeper_.tell();
-  // After an error systemd starts another one, which is to be as dark as this one.
+  // After an error, here or below, systemd starts another one, which is to be as dark as this one.
   if (!record) return tl::unexpected<Error>(record.error());
-  ended_well_ = true;
-  remember_dark();
-
   Summary summary = summary_of(*record, tracker_start);
   if (!config_.summary.empty()) VENEER_TRY(write_summary(summary, config_.summary));
   if (!config_.frame_log.empty()) VENEER_TRY(write_frame_log(*record, config_.frame_log));
+  ended_well_ = true;
+  remember_dark();
   return summary;
 }
 
@@ -286,7 +285,7 @@ Result<TheDaemon::Stage*> TheDaemon::stage() const {
 Status TheDaemon::change(FaultKind about, std::function<Status(Script&)> edit) {
   VENEER_ASSIGN(Stage* const stage, this->stage());
   return stage->loader.call([this, stage, about, edit = std::move(edit)]() -> Status {
-    Script next = stage->loader.current();
+    Script next = stage->loader.current_as_drawn();
     VENEER_TRY(edit(next));
     VENEER_TRY(stage->loader.exchange(std::move(next)));
     stage->reloader.overridden();
@@ -343,6 +342,11 @@ Status TheDaemon::blank(bool on) {
   constexpr int kTries = 500;
   for (int i = 0; i < kTries && wishes_.is_dark != on; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  if (on && !wishes_.is_dark)
+    return fail(
+        Errc::kTimeout,
+        "blanking: the display has not said within a second that it is dark; that is asked for "
+        "and will be done when it can be; until then see to the projector itself");
   return {};
 }
 

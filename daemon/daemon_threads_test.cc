@@ -6,7 +6,10 @@
 #include <thread>
 #include <vector>
 
+#include "base/files.h"
+#include "calibration/profile_store.h"
 #include "daemon/testing/real_time_fixture.h"
+#include "render/internal_testing.h"
 
 namespace veneer::daemon {
 namespace {
@@ -105,6 +108,37 @@ TEST_F(RealTimeDaemonTest, BlankReturnsWhenItIsDark) {
   end();
 }
 
+TEST_F(RealTimeDaemonTest, BlankSaysSoWhereTheDisplayDoesNotGoDark) {
+  start();
+  hand_.output_stays_lit = true;
+  const Status refused = daemon_->blank(true);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, Errc::kTimeout);
+  hand_.output_stays_lit = false;
+  EXPECT_TRUE(wait_until([&] { return hand_.dark.load(); })) << "it is still asked for";
+  end();
+}
+
+TEST_F(RealTimeDaemonTest, ACommandKeepsTheProfileThatCameSinceTheShowWasMade) {
+  const calibration::ProfileStore store(at("profile"));
+  calibration::ProjectorProfile profile = render::example_profile(8, 6, 8);
+  const double before_m = profile.reference_distance_m;
+  start();
+  profile.reference_distance_m = 2 * before_m;
+  ASSERT_TRUE(store.publish(profile));
+  ASSERT_TRUE(wait_until([&] { return hand_.given_distance_m == 2 * before_m; }));
+  EXPECT_TRUE(wait_until([&] {
+    EXPECT_TRUE(daemon_->set_light(0, {{0, 0, 1}, 10.0, {1, 1, 1}}));
+    return profile_distance_m_ == 2 * before_m;
+  }));
+  ASSERT_TRUE(write_text(at("profile") / "profile.json", "damaged"));
+  EXPECT_TRUE(daemon_->set_light(0, {{0, 0, 1}, 20.0, {1, 1, 1}}));
+  EXPECT_EQ(profile_distance_m_, 2 * before_m) << "though what lies there by now cannot be read";
+  end();
+  profile.reference_distance_m = before_m;
+  ASSERT_TRUE(store.publish(profile));
+}
+
 /// With a runtime directory, as systemd gives one.
 class DarkDaemonTest : public RealTimeDaemonTest {
  protected:
@@ -112,7 +146,10 @@ class DarkDaemonTest : public RealTimeDaemonTest {
     RealTimeDaemonTest::SetUp();
     ::setenv("RUNTIME_DIRECTORY", runtime_.path().c_str(), 1);
   }
-  void TearDown() override { ::unsetenv("RUNTIME_DIRECTORY"); }
+  void TearDown() override {
+    RealTimeDaemonTest::TearDown();
+    ::unsetenv("RUNTIME_DIRECTORY");
+  }
   [[nodiscard]] bool remembered() const {
     return std::filesystem::exists(runtime_.path() / "dark");
   }
@@ -144,6 +181,15 @@ TEST_F(DarkDaemonTest, DarknessEndsWithAStopInGoodOrder) {
   EXPECT_TRUE(remembered());
   end();
   EXPECT_FALSE(remembered());
+}
+
+TEST_F(DarkDaemonTest, DarknessOutlivesAnEndThatFails) {
+  write_config("summary = \"scene.toml/summary.json\"\n");
+  start();
+  EXPECT_TRUE(daemon_->blank(true));
+  stop_ = true;
+  EXPECT_FALSE(ran_.get());
+  EXPECT_TRUE(remembered()) << "systemd starts another one";
 }
 
 TEST_F(DarkDaemonTest, DarknessOutlivesAStartThatFails) {

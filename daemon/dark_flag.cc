@@ -14,8 +14,11 @@ DarkFlag::DarkFlag(const std::filesystem::path& folder)
     : path_(folder.empty() ? std::filesystem::path() : folder / kFile) {}
 
 bool DarkFlag::is_up() const {
-  std::error_code ignored;
-  return !path_.empty() && std::filesystem::exists(path_, ignored);
+  if (path_.empty()) return false;
+  // What cannot be looked at may be there.
+  std::error_code doubt;
+  const auto status = std::filesystem::symlink_status(path_, doubt);
+  return status.type() != std::filesystem::file_type::not_found;
 }
 
 Status DarkFlag::put(bool up) const {

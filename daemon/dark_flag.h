@@ -16,7 +16,7 @@ class DarkFlag {
 
   /// @param folder  empty: nothing is remembered.
   explicit DarkFlag(const std::filesystem::path& folder);
-  /// Whether the dark was asked for and not taken back. False where that cannot be told.
+  /// Whether the dark was asked for and not taken back; true where that cannot be told.
   [[nodiscard]] bool is_up() const;
   /// Errors: kIo (a full disk); a flag that is down stays down then, one that is up stays up.
   [[nodiscard]] Status put(bool up) const;

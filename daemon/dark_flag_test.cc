@@ -43,6 +43,7 @@ TEST(DarkFlag, FollowsNoLink) {
   std::filesystem::create_symlink(folder.path() / "elsewhere", folder.path() / DarkFlag::kFile);
   EXPECT_FALSE(DarkFlag(folder.path()).put(true));
   EXPECT_FALSE(std::filesystem::exists(folder.path() / "elsewhere"));
+  EXPECT_TRUE(DarkFlag(folder.path()).is_up()) << "on any doubt it is dark";
 }
 
 }  // namespace

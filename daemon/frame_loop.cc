@@ -170,11 +170,13 @@ void FrameLoop::notice_tracker() {
 // --- between two frames
 
 void FrameLoop::between_frames() {
-  const bool drawing = show_->renderer && !show_->lost;
-  if (show_->profiles && drawing) show_->profiles->apply(*show_->renderer);
-  parts_.loader.set_drawing(drawing);
+  if (show_->profiles && show_->renderer && !show_->lost) show_->profiles->apply(*show_->renderer);
   const std::size_t rung = show_->governor.rung();
-  if (parts_.loader.take_next(show_)) show_->governor.begin_on(rung);
+  if (parts_.loader.take_next(show_)) {
+    show_->governor.begin_on(rung);
+    renderer_asked_for_ = false;
+  }
+  parts_.loader.set_drawing(show_->renderer && !show_->lost);
 }
 
 // Whether there is an output, and a show that suits it.
@@ -196,7 +198,8 @@ bool FrameLoop::keep_output() {
       drop_renderer();  // made for another display
     }
   }
-  if (!show_->renderer) parts_.loader.want_renderer();
+  // Once: where it cannot be made, the loader tries again by itself.
+  if (!show_->renderer && !std::exchange(renderer_asked_for_, true)) parts_.loader.want_renderer();
   return true;
 }
 

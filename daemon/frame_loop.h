@@ -142,6 +142,7 @@ class FrameLoop {
   bool dark_ = false;  // and the output knows
   bool dark_failed_ = false;
   Time dark_told_;
+  bool renderer_asked_for_ = false;
   PoseTrouble pose_trouble_ = PoseTrouble::kNone;
   Duration slept_before_{};  // of CLOCK_BOOTTIME over CLOCK_MONOTONIC
 };

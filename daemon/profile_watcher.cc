@@ -27,6 +27,7 @@ double milliseconds_since(SteadyClockPoint begin) {
 
 struct ProfileWatcher::HandOver {
   render::PreparedProfile profile;
+  FileIdentity identity;
   Status taken;
   double swap_ms = 0;
 };
@@ -101,7 +102,7 @@ bool ProfileWatcher::read(const FileIdentity& found) {
     refuse(prepared.error());
     return true;
   }
-  auto next = std::make_unique<HandOver>(HandOver{std::move(*prepared), {}, 0});
+  auto next = std::make_unique<HandOver>(HandOver{std::move(*prepared), found, {}, 0});
   // One that the frame loop has not taken yet is overtaken.
   delete prepared_.exchange(next.release());
   return true;
@@ -114,6 +115,11 @@ void ProfileWatcher::dispose_of_used() {
     refuse(used->taken.error());
     return;
   }
+  auto given = std::make_shared<const Given>(Given{used->profile.profile(), used->identity});
+  {
+    const std::scoped_lock lock(answer_mutex_);
+    given_ = std::move(given);
+  }
   ++reloads_;
   longest_swap_ms_ = std::max(longest_swap_ms_.load(), used->swap_ms);
   spdlog::info("the projector profile was exchanged in {:.1f} ms", used->swap_ms);
@@ -122,9 +128,10 @@ void ProfileWatcher::dispose_of_used() {
 
 void ProfileWatcher::watch(const std::stop_token& stop, std::optional<FileIdentity> known) {
   int missing = 0;
-  SteadyClockPoint looked = std::chrono::steady_clock::now();
-  while (!stop.stop_requested()) {
-    std::this_thread::sleep_for(std::min(kFlagInterval, interval_));
+  // One may have come while the renderer was made, which may not be drawn with for long.
+  SteadyClockPoint looked = std::chrono::steady_clock::now() - interval_;
+  for (bool first = true; !stop.stop_requested(); first = false) {
+    if (!first) std::this_thread::sleep_for(std::min(kFlagInterval, interval_));
     dispose_of_used();
     const bool asked = asked_.exchange(false);
     const SteadyClockPoint now = std::chrono::steady_clock::now();
@@ -147,6 +154,12 @@ void ProfileWatcher::watch(const std::stop_token& stop, std::optional<FileIdenti
     if (read(*found)) known = found;
   }
   dispose_of_used();
+}
+
+std::shared_ptr<const ProfileWatcher::Given> ProfileWatcher::given() {
+  dispose_of_used();
+  const std::scoped_lock lock(answer_mutex_);
+  return given_;
 }
 
 void ProfileWatcher::apply(render::Renderer& renderer) {

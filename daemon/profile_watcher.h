@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <stop_token>
@@ -14,6 +15,7 @@
 #include <thread>
 
 #include "base/result.h"
+#include "calibration/profile.h"
 #include "daemon/file_identity.h"
 #include "render/prepared_profile.h"
 #include "render/renderer.h"
@@ -42,9 +44,11 @@ class ProfileWatcher {
   /// The file of the folder by which a profile is known.
   static constexpr std::string_view kProfileFile = "profile.json";
 
-  /// @param known  which kProfileFile stood in the folder before the renderer's profile was read.
+  /// @param known  which kProfileFile stood in the folder before the renderer's profile was read;
+  ///               one that came since is looked for at once.
   /// @param raster, options  the renderer's.
-  /// @param heard  called by the watching thread with what became of a profile, or with kNotFound
+  /// @param heard  called by the watching thread, or by who asks for given(), with what became of a
+  /// profile, or with kNotFound
   ///               once where the folder has been without one for a while; may be empty.
   ProfileWatcher(std::filesystem::path folder,
                  const std::optional<FileIdentity>& known,
@@ -62,6 +66,13 @@ class ProfileWatcher {
   /// where none is drawn.
   [[nodiscard]] Status check(std::chrono::milliseconds patience,
                              const std::function<bool()>& drawing);
+  /// The profile that the renderer was given last, and which file it was; nothing while it has the
+  /// one that it was made with. Any thread but the frame loop's: it may wait.
+  struct Given {
+    calibration::ProjectorProfile profile;
+    FileIdentity identity;
+  };
+  [[nodiscard]] std::shared_ptr<const Given> given();
   /// For the frame loop: gives a newly prepared profile, if there is one, to the renderer. Never
   /// waits, and allocates only what GL does.
   void apply(render::Renderer& renderer);
@@ -90,6 +101,7 @@ class ProfileWatcher {
   std::condition_variable answered_;
   std::uint64_t answers_ = 0;
   Status last_answer_;
+  std::shared_ptr<const Given> given_;
   std::atomic<std::uint64_t> reloads_{0};
   std::atomic<std::uint64_t> refusals_{0};
   std::atomic<double> longest_swap_ms_{0};

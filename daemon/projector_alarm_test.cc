@@ -20,7 +20,10 @@ class ProjectorAlarmTest : public testing::RealTimeFixture {
     machine_.state.power = projector::Power::kOn;
     machine_.state.input = "digital1";
   }
-  void TearDown() override { publish("profile", {}); }
+  void TearDown() override {
+    RealTimeFixture::TearDown();
+    publish("profile", {});
+  }
   static void publish(const std::string& name, const projector::ControlRecord& record) {
     calibration::ProjectorProfile profile = render::example_profile(8, 6, 8);
     profile.record = record;

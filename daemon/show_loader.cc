@@ -105,11 +105,11 @@ void ShowLoader::serve() {
 // The GPU has forgotten everything, or its display went away: the same again.
 void ShowLoader::remake() {
   if (!backoff_.due(clock_.now())) return;
-  // What the renderer was given since its show was made.
+  // What came meanwhile, which nobody gives to a lost one.
   Script script = current_;
   if (Status status = read_profile(script, nullptr);
       !status || !render::check_exchangeable(current_.raster(), script.profile)) {
-    script = current_;
+    script = current_as_drawn();
   }
   Result<std::unique_ptr<Show>> made = make(std::move(script));
   Status status;
@@ -211,6 +211,16 @@ Status ShowLoader::offer(std::unique_ptr<Show> show) {
   describe(*offered);
   dispose_of_used();
   return {};
+}
+
+Script ShowLoader::current_as_drawn() const {
+  Script script = current_;
+  if (shown_ == nullptr || !shown_->profiles) return script;
+  if (const auto given = shown_->profiles->given()) {
+    script.profile = given->profile;
+    script.profile_identity = given->identity;
+  }
+  return script;
 }
 
 Status ShowLoader::exchange(Script next) {

@@ -54,6 +54,8 @@ class ShowLoader {
   // For `work`.
 
   [[nodiscard]] const Script& current() const { return current_; }
+  /// The current script with the profile that the renderer was given since it was made.
+  [[nodiscard]] Script current_as_drawn() const;
   /// Draws with another script, and returns when the frame loop has taken it.
   /// Errors: those of the renderer; kInvalidOption (another raster); kTimeout, kUnavailable.
   [[nodiscard]] Status exchange(Script next);

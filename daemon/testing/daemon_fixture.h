@@ -67,11 +67,12 @@ class DaemonFixture : public ::testing::Test {
     };
     devices.make_renderer = [this](const render::Scene& scene,
                                    std::span<const render::Level>,
-                                   const calibration::ProjectorProfile&,
+                                   const calibration::ProjectorProfile& profile,
                                    const render::RendererOptions& options,
                                    const Scanout*) -> Result<std::unique_ptr<render::Renderer>> {
       if (hand_.renderer_refuses) return fail(Errc::kUnavailable, "there is no GPU");
       ++hand_.renderers;
+      profile_distance_m_ = profile.reference_distance_m;
       lux_ = std::get<render::DirectionalLight>(scene.lights.at(0)).illuminance_rgb.x();
       return std::make_unique<FakeRenderer>(hand_, static_cast<int>(options.luminance_ceiling));
     };
@@ -81,8 +82,9 @@ class DaemonFixture : public ::testing::Test {
 
   static inline TemporaryFolder* folder_ = nullptr;
   Stagehand hand_;
-  std::atomic<double> lux_{0};       ///< of the scene that the last renderer was made for
-  std::atomic<double> pressure_{0};  ///< of memory
+  std::atomic<double> lux_{0};                 ///< of the scene that the last renderer was made for
+  std::atomic<double> profile_distance_m_{0};  ///< of its profile
+  std::atomic<double> pressure_{0};            ///< of memory
 };
 
 }  // namespace veneer::daemon::testing

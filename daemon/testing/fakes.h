@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "projector/output.h"
+#include "render/prepared_profile.h"
 #include "render/renderer.h"
 #include "tracking/tracker.h"
 
@@ -21,23 +22,25 @@ namespace veneer::daemon::testing {
 
 /// What the fakes share with their test, which turns its switches from any thread.
 struct Stagehand {
-  std::atomic<bool> tracker_gone{false};     ///< wait_pose() says kDisconnected
-  std::atomic<bool> tracker_silent{false};   ///< says kTimeout
-  std::atomic<bool> tracker_refuses{false};  ///< cannot be opened
-  std::atomic<int> trackers{0};              ///< how many were opened
-  std::atomic<bool> output_away{false};      ///< present() says kUnavailable
-  std::atomic<bool> output_broken{false};    ///< says kIo
-  std::atomic<bool> output_closed{false};    ///< says kCancelled
-  std::atomic<bool> output_refuses{false};   ///< cannot be opened
+  std::atomic<bool> tracker_gone{false};      ///< wait_pose() says kDisconnected
+  std::atomic<bool> tracker_silent{false};    ///< says kTimeout
+  std::atomic<bool> tracker_refuses{false};   ///< cannot be opened
+  std::atomic<int> trackers{0};               ///< how many were opened
+  std::atomic<bool> output_away{false};       ///< present() says kUnavailable
+  std::atomic<bool> output_broken{false};     ///< says kIo
+  std::atomic<bool> output_stays_lit{false};  ///< blank() says kUnavailable
+  std::atomic<bool> output_closed{false};     ///< says kCancelled
+  std::atomic<bool> output_refuses{false};    ///< cannot be opened
   std::atomic<int> outputs{0};
   std::atomic<std::uint64_t> presented{0};
   std::atomic<int> blanks{0};
   std::atomic<bool> gpu_lost{false};          ///< of the renderers that there are
   std::atomic<bool> renderer_refuses{false};  ///< cannot be made
   std::atomic<int> renderers{0};
-  std::atomic<int> alive{0};     ///< renderers that were not destroyed
-  std::atomic<bool> dark{true};  ///< as the audience sees it
-  std::atomic<int> ceiling{0};   ///< of the renderer whose frame was presented last
+  std::atomic<int> alive{0};                ///< renderers that were not destroyed
+  std::atomic<bool> dark{true};             ///< as the audience sees it
+  std::atomic<int> ceiling{0};              ///< of the renderer whose frame was presented last
+  std::atomic<double> given_distance_m{0};  ///< of the profile that a renderer was given last
   std::vector<double> level_ms;  ///< what a frame takes on each level; nothing where empty
 };
 
@@ -90,7 +93,10 @@ class FakeRenderer : public render::Renderer {
     return lost_;
   }
   void draw_to_scanout(std::size_t /*buffer*/) override {}
-  Status set_profile(const render::PreparedProfile&) override { return {}; }
+  Status set_profile(const render::PreparedProfile& profile) override {
+    hand_.given_distance_m = profile.profile().reference_distance_m;
+    return {};
+  }
   void draw(const render::FrameInput& input) override {
     EXPECT_FALSE(lost_) << "nothing is drawn with what is lost";
     inputs.push_back(input);
@@ -140,6 +146,7 @@ class FakeOutput : public projector::Output {
     return {};
   }
   Status blank() override {
+    if (hand_.output_stays_lit) return fail(Errc::kUnavailable, "it does not take a black picture");
     ++hand_.blanks;
     hand_.dark = true;
     return {};

@@ -35,6 +35,11 @@ class RealTimeFixture : public DaemonFixture {
     });
     ASSERT_TRUE(wait_until([&] { return daemon_->frames() > 10; }));
   }
+  /// Where a test gave up before its end(): else its thread would be waited for for ever.
+  void TearDown() override {
+    stop_ = true;
+    if (ran_.valid()) ran_.wait();
+  }
   void end() {
     stop_ = true;
     const Result<Summary> summary = ran_.get();

@@ -318,9 +318,12 @@ void Soak::look_for_recovery(Active& active, const ServiceStatus& status) {
     return other && other->kind != nullptr && other->kind != &kind &&
            other->kind->fault == kind.fault;
   });
-  const bool over = !kind.fault || brought_otherwise || !lists(status, *kind.fault);
+  const bool over = !kind.fault || !lists(status, *kind.fault);
   Tally& tally = result_.tallies[static_cast<std::size_t>(kind.injection)];
-  if (frames && over) {
+  if (frames && brought_otherwise && !over) {
+    ++tally.untold;
+    active.kind = nullptr;
+  } else if (frames && over) {
     tally.listed += active.listed ? 1 : 0;
     tally.longest = std::max(tally.longest, took);
     ++tally.recovered;

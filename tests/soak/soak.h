@@ -38,8 +38,9 @@ struct Tally {
   std::uint64_t listed = 0;     ///< injections that the daemon named among its faults
   std::uint64_t lasting = 0;    ///< those that lasted long enough to be named (named_after)
   std::uint64_t recovered = 0;  ///< within its time
-  std::uint64_t untold = 0;  ///< nobody can say: the machine was busy with other things all along
-  Duration longest{};        ///< recovery
+  /// Nobody can say: the machine was busy all along, or another thing kept the fault up.
+  std::uint64_t untold = 0;
+  Duration longest{};  ///< recovery
 };
 
 struct SoakResult {
