@@ -392,6 +392,14 @@ Result<TexelMap> synthesize_texels(const TexelFeatures& features,
                                    const SynthesisOptions& options,
                                    Progress& progress) {
   VENEER_TRY(options.check(features.width, features.height));
+  for (Eigen::Index texel = 0; texel < features.values.cols(); ++texel) {
+    if (features.values.col(texel).allFinite()) continue;
+    return fail(
+        Errc::kBadFormat,
+        "laying patches of a sample: its texel {} sends light that is no finite number, so that "
+        "the material's file is damaged; fit it again",
+        texel);
+  }
   Quilt quilt(features, options);
   progress.start("laying patches", quilt.patch_count());
   for (std::int64_t i = 0; i < quilt.patch_count(); ++i) {

@@ -19,7 +19,7 @@ struct TexelFeatures {
 
   int width = 0;   ///< texels
   int height = 0;  ///< texels
-  Values values;   ///< a column for each texel, row by row; finite
+  Values values;   ///< a column for each texel, row by row; finite but for a damaged material's
 };
 
 /// The features of a material's texels: the square roots of what they send at a dozen measured
@@ -48,7 +48,7 @@ struct SynthesisOptions {
 ///
 /// Every patch is compared everywhere: work grows as (width height / patch) times overlap times the
 /// sample's texels.
-/// Errors: kInvalidOption of SynthesisOptions::check().
+/// Errors: kInvalidOption of SynthesisOptions::check(); kBadFormat (a feature is not finite).
 [[nodiscard]] Result<TexelMap> synthesize_texels(const TexelFeatures& features,
                                                  const SynthesisOptions& options,
                                                  Progress& progress);

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -246,6 +247,19 @@ TEST(TexelSynthesis, RefusesSizesThatCannotBe) {
 }
 
 // Texels that look alike are alike, and those that differ at any pair that is looked at differ.
+TEST(TexelSynthesis, RefusesASampleThatIsNotFinite) {
+  for (const float bad :
+       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+    TexelFeatures features = irregular_features(1);
+    features.values(0, 77) = bad;
+    SilentProgress progress;
+    const auto map = synthesize_texels(features, options_for(64, 1), progress);
+    ASSERT_FALSE(map);
+    EXPECT_EQ(map.error().code, Errc::kBadFormat);
+    EXPECT_NE(map.error().what.find("texel 77"), std::string::npos) << map.error().what;
+  }
+}
+
 TEST(TexelFeaturesOfAMaterial, TellTexelsApartAsTheyLook) {
   const TemporaryFolder folder;
   SampleSetInfo info = testing::small_info();

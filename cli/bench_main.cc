@@ -8,7 +8,7 @@ int main(int argc, char** argv) {
   using namespace veneer::cli;
   constexpr Command kBench{
       "bench",
-      "Time what this machine does: render, fit, query, colour, latency, governor",
+      "Time what this machine does: render, fit, query, colour, latency, governor, layers",
       &run_bench};
   return run_command(kBench, {argv + (argc > 0 ? 1 : 0), argv + argc});
 }

@@ -20,9 +20,10 @@ Result<int> run_completion(cli::CommandLine& line);
 Result<int> run_manual(cli::CommandLine& line);
 
 constexpr std::array kCommands{
-    Command{"bench",
-            "Time what this machine does: bench render, fit, query, colour, latency, governor",
-            &cli::run_bench},
+    Command{
+        "bench",
+        "Time what this machine does: bench render, fit, query, colour, latency, governor, layers",
+        &cli::run_bench},
     Command{"calibrate",
             "Lead through measuring a projector and write its profile",
             &cli::run_calibrate},

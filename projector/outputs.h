@@ -22,8 +22,7 @@ struct OutputDriver {
                                           const std::filesystem::path& state_directory);
 };
 
-/// Every output, sorted by name: "file" (PNG of the drive codes, 8 or 16 bits, and EXR of the
-/// target if asked for; written by a thread of its own), "null", "window".
+/// Every output, sorted by name.
 [[nodiscard]] std::span<const OutputDriver> output_drivers();
 /// Opens the output that the key `driver` of the table names.
 /// @param state_directory  where a driver keeps what is to outlive it, unless its own table says

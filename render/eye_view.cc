@@ -103,8 +103,11 @@ Result<std::vector<Eigen::Vector4f>> draw_surface(const Scene& scene,
                 geometry.height);
   pass.draw(framebuffer.id(), MeshBuffers(scene.mesh), input);
   std::vector<Eigen::Vector4f> pixels = read(framebuffer.id(), geometry);
-  // A projector's geometric factor; from an eye what is drawn hides all.
-  for (Eigen::Vector4f& pixel : pixels) pixel.w() = pixel.w() > 0.0F ? 1.0F : 0.0F;
+  // A projector's geometric factor stands there; from an eye whatever was drawn hides, also what
+  // faces away. Nothing was where depth is that of the farthest, 0.
+  std::vector<float> depths(pixels.size());
+  glReadPixels(0, 0, geometry.width, geometry.height, GL_DEPTH_COMPONENT, GL_FLOAT, depths.data());
+  for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i].w() = depths[i] > 0.0F ? 1.0F : 0.0F;
   return pixels;
 }
 

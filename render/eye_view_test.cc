@@ -81,6 +81,13 @@ double largest_difference(const EyePicture& a, const EyePicture& b) {
   return largest;
 }
 
+double largest_difference_hidden(const EyePicture& a, const EyePicture& b) {
+  double largest = 0;
+  for (std::size_t i = 0; i < a.hidden.pixels().size(); ++i)
+    largest = std::max(largest, double(std::abs(a.hidden.pixels()[i] - b.hidden.pixels()[i])));
+  return largest;
+}
+
 double brightest(const EyePicture& picture) {
   double most = 0;
   for (const Rgb32f& pixel : picture.radiance_xyz.pixels())
@@ -114,7 +121,23 @@ TEST(Shells, WithNothingAboveTheSurfaceAreThePlainDraw) {
       ASSERT_TRUE(shells) << shells.error().what;
       EXPECT_GT(brightest(*plain), 10);
       EXPECT_LE(largest_difference(*plain, *shells), kRounding * brightest(*plain));
+      EXPECT_LE(largest_difference_hidden(*plain, *shells), kRounding);
       EXPECT_GT(disc_radius(*plain), 50);
+    }
+  }
+}
+
+TEST(Shells, ASurfaceHidesFromBehindToo) {
+  if (!has_gl()) GTEST_SKIP() << "no OpenGL";
+  const auto material = material_of(random_stack({1.0F, 0.0F}, Upper::kClear));
+  const Scene scene = scene_of("plate", {6, 3});
+  for (const double z : {0.9, -0.9}) {
+    const Vector3d eye(0.3, 0.2, z);
+    for (const bool shells : {false, true}) {
+      const auto picture = draw_from_eye(scene, *material, view_from(eye, shells));
+      ASSERT_TRUE(picture) << picture.error().what;
+      EXPECT_GT(disc_radius(*picture), 30) << z << shells;
+      EXPECT_EQ(brightest(*picture) > 0, z > 0) << "it has one side";
     }
   }
 }

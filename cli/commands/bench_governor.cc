@@ -22,6 +22,7 @@
 #include "cli/governor/drive.h"
 #include "cli/governor/load.h"
 #include "cli/harness/stand_ins.h"
+#include "cli/picture_size.h"
 #include "quality/governor.h"
 #include "render/renderer.h"
 #include "simulation/materials/phong_texture.h"
@@ -231,17 +232,6 @@ std::string percent(const std::optional<double>& part) {
   return part ? fmt::format("{:.1f} %", 100 * *part) : "-";
 }
 
-Status parse_size(const std::string& size, int& width, int& height) {
-  char rest = 0;
-  if (std::sscanf(size.c_str(), "%dx%d%c", &width, &height, &rest) != 2 || width < 16 ||
-      height < 16 || width > 8192 || height > 8192) {
-    return fail(Errc::kInvalidOption,
-                "--size {}: expected WIDTHxHEIGHT, 16 to 8192 each, such as 320x240",
-                size);
-  }
-  return {};
-}
-
 /// What was measured and what is said of it.
 struct Outcome {
   ordered_json object;
@@ -310,9 +300,7 @@ void tell_phases(const std::vector<Rung>& rungs,
 }  // namespace
 
 Result<int> bench_governor(const BenchGovernorOptions& options, CommandLine& line) {
-  int width = 0;
-  int height = 0;
-  VENEER_TRY(parse_size(options.size, width, height));
+  VENEER_ASSIGN(const PictureSize size, parse_size(options.size, 16, 8192));
   if (options.seconds < kLeastSeconds)
     return fail(Errc::kInvalidOption,
                 "--seconds {}: with less than {} there is no time in which a load is steady",
@@ -323,7 +311,7 @@ Result<int> bench_governor(const BenchGovernorOptions& options, CommandLine& lin
   if (error) return fail(Errc::kIo, "finding a folder for what is temporary: {}", error.message());
   VENEER_ASSIGN(const StagedFolder scratch, StagedFolder::create(temporary / "veneer-governor"));
   VENEER_ASSIGN(const auto material, fit_material(scratch.path(), line.progress()));
-  VENEER_TRY(make_stand_in_profile(scratch.path() / "profile", width, height));
+  VENEER_TRY(make_stand_in_profile(scratch.path() / "profile", size.width, size.height));
   VENEER_ASSIGN(const calibration::ProjectorProfile profile,
                 calibration::ProjectorProfile::load(scratch.path() / "profile"));
   VENEER_ASSIGN(const render::Scene scene, make_scene());

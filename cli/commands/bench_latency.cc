@@ -12,6 +12,7 @@
 #include "base/exit_code.h"
 #include "base/files.h"
 #include "cli/harness/stand_ins.h"
+#include "cli/picture_size.h"
 #include "cli/programs.h"
 
 namespace veneer::cli {
@@ -89,21 +90,14 @@ double cpu_of_children() {
 }  // namespace
 
 Result<int> bench_latency(const BenchLatencyOptions& options, CommandLine& line) {
-  int width = 0;
-  int height = 0;
-  char rest = 0;
-  if (std::sscanf(options.size.c_str(), "%dx%d%c", &width, &height, &rest) != 2 || width < 1 ||
-      height < 1 || width > 16384 || height > 16384) {
-    return fail(
-        Errc::kInvalidOption, "--size {}: expected WIDTHxHEIGHT, such as 320x240", options.size);
-  }
+  VENEER_ASSIGN(const PictureSize size, parse_size(options.size));
   std::error_code error;
   const fs::path temporary = fs::temp_directory_path(error);
   if (error) return fail(Errc::kIo, "finding a folder for what is temporary: {}", error.message());
   VENEER_ASSIGN(const StagedFolder scratch, StagedFolder::create(temporary / "veneer-latency"));
   const fs::path& folder = scratch.path();
   VENEER_TRY(make_stand_in_material(folder / "material.safetensors", line.progress()));
-  VENEER_TRY(make_stand_in_profile(folder / "profile", width, height));
+  VENEER_TRY(make_stand_in_profile(folder / "profile", size.width, size.height));
   VENEER_TRY(write_files(options, folder));
   const double cpu_before = cpu_of_children();
   VENEER_TRY(run_program("veneerd", {"--config", (folder / "veneer.toml").string(), "--quiet"}));

@@ -14,6 +14,7 @@
 #include "base/exit_code.h"
 #include "btf/material.h"
 #include "btf/sample_set.h"
+#include "cli/picture_size.h"
 #include "render/benchmark.h"
 #include "simulation/materials/synthesize.h"
 
@@ -168,11 +169,9 @@ Result<int> bench_render(const BenchRenderOptions& options, CommandLine& line) {
   bench.frames = options.frames;
   bench.texels_per_pixel = options.texels_per_pixel;
   bench.reference_rays = options.rays;
-  if (char rest = 0;
-      std::sscanf(options.size.c_str(), "%dx%d%c", &bench.width, &bench.height, &rest) != 2) {
-    return fail(
-        Errc::kInvalidOption, "--size {}: expected WIDTHxHEIGHT, such as 1024x768", options.size);
-  }
+  VENEER_ASSIGN(const PictureSize size, parse_size(options.size));
+  bench.width = size.width;
+  bench.height = size.height;
   VENEER_TRY(options.cache.check());
   for (const fs::path& file : options.materials) {
     VENEER_ASSIGN(std::unique_ptr<btf::Material> fitted, btf::load_material(file));

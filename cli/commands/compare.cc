@@ -16,6 +16,7 @@
 #include "btf/held_out.h"
 #include "cli/commands/commands.h"
 #include "cli/comparison/tables.h"
+#include "cli/picture_size.h"
 
 namespace veneer::cli {
 namespace {
@@ -274,13 +275,9 @@ Result<int> run_compare(CommandLine& line) {
   app.add_option("--seed", options.seed, "Seed of everything random")->capture_default_str();
   line.parse();
   std::erase(options.tables, 0);  // what CLI11 makes of --tables alone
-  if (char rest = 0;
-      std::sscanf(
-          options.size.c_str(), "%dx%d%c", &options.bench.width, &options.bench.height, &rest) !=
-      2) {
-    return fail(
-        Errc::kInvalidOption, "--size {}: expected WIDTHxHEIGHT, such as 1024x768", options.size);
-  }
+  VENEER_ASSIGN(const PictureSize size, parse_size(options.size));
+  options.bench.width = size.width;
+  options.bench.height = size.height;
   VENEER_TRY(options.bench.check());  // before minutes of fitting
 
   VENEER_ASSIGN(const Comparison comparison, compare(options, line));

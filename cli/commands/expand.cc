@@ -12,26 +12,9 @@
 #include "btf/mapped_material.h"
 #include "btf/texel_synthesis.h"
 #include "cli/commands/commands.h"
+#include "cli/picture_size.h"
 
 namespace veneer::cli {
-namespace {
-
-// "512x384".
-Result<std::array<int, 2>> parse_size(const std::string& text) {
-  std::array<int, 2> size{};
-  const char* const end = text.data() + text.size();
-  const auto [middle, first_error] = std::from_chars(text.data(), end, size[0]);
-  if (first_error == std::errc{} && middle != end && *middle == 'x') {
-    const auto [last, error] = std::from_chars(middle + 1, end, size[1]);
-    if (error == std::errc{} && last == end) return size;
-  }
-  return fail(Errc::kInvalidOption,
-              "expanding: --size is \"{}\"; give the texels along both sides, as in 512x512",
-              text);
-}
-
-}  // namespace
-
 Result<int> run_expand(CommandLine& line) {
   std::filesystem::path path;
   std::filesystem::path out;
@@ -50,9 +33,9 @@ Result<int> run_expand(CommandLine& line) {
                "The sample is a tile itself: patches may reach around its edges");
   app.add_option("--seed", options.seed, "Seed of everything random")->capture_default_str();
   line.parse();
-  VENEER_ASSIGN(const auto sides, parse_size(size));
-  options.width = sides[0];
-  options.height = sides[1];
+  VENEER_ASSIGN(const PictureSize sides, parse_size(size));
+  options.width = sides.width;
+  options.height = sides.height;
 
   // What it was fitted on, and under which licence, stays true of it.
   VENEER_ASSIGN(const SafetensorsFile file, SafetensorsFile::open(path));

@@ -255,8 +255,10 @@ Result<int> run_projector(CommandLine& line) {
   app.add_option("--port", options.port, "Where 4352 is not it");
   app.add_option("--password-file", options.password_file, "Its first line is the password");
   app.add_option("--serial", options.serial, "Which one of several on USB");
-  app.add_option(
-      "--led-enable", options.led_enable, "What lights the LEDs after unblank: red blue");
+  app.add_option("--led-enable",
+                 options.led_enable,
+                 "dlpc350: what lights the LEDs after an unblank that finds them dark: sequencer, "
+                 "or by hand, as in \"red blue\"");
   CLI::App* const asked =
       app.add_subcommand("status", "Say how it is, and what would spoil colours")->fallthrough();
   asked->add_option("--watch", options.watch_s, "Again every 2 s, for so many seconds")

@@ -10,6 +10,7 @@
 #include "calibration/profile.h"
 #include "cli/commands/commands.h"
 #include "cli/commands/render_from_eye.h"
+#include "cli/picture_size.h"
 #include "render/renderer.h"
 
 namespace veneer::cli {
@@ -97,10 +98,9 @@ Result<int> run_render(CommandLine& line) {
     return fail(Errc::kInvalidOption,
                 "drawing a scene: say for which projector with --profile, or ask for what the eye "
                 "sees with --from-eye");
-  if (char rest = 0;
-      std::sscanf(size.c_str(), "%dx%d%c", &seen.view.width, &seen.view.height, &rest) != 2) {
-    return fail(Errc::kInvalidOption, "--size {}: expected WIDTHxHEIGHT, such as 800x600", size);
-  }
+  VENEER_ASSIGN(const PictureSize seen_size, parse_size(size));
+  seen.view.width = seen_size.width;
+  seen.view.height = seen_size.height;
   VENEER_ASSIGN(drawing.evaluation, render::parse_evaluation(evaluation));
   VENEER_TRY(drawing.check());
   if (out.extension() != ".png" && out.extension() != ".exr") {

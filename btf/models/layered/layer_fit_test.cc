@@ -9,6 +9,7 @@
 #include "base/random.h"
 #include "base/testing/temporary_folder.h"
 #include "btf/internal_test_sets.h"
+#include "btf/models/layered/layer_heights.h"
 
 namespace veneer::btf {
 namespace {
@@ -146,6 +147,19 @@ TEST(LayerFit, FindsALayeredSetAgainFromNoisySamples) {
     EXPECT_LE(got.rmse, 1.2 * kNoise) << seed;
     RecordProperty(fmt::format("rmse_over_noise_{}", seed),
                    fmt::format("{:.4f}", got.rmse / kNoise));
+  }
+}
+
+TEST(LayerFit, HasAsManyLayersAsWereAskedFor) {
+  const TemporaryFolder folder;
+  const SampleSet set = seen(folder.path() / "bars.btfset", bars(1), kNoise, 1);
+  const auto pairs = FittedPairs::of(set.info(), nullptr);
+  SilentProgress progress;
+  for (const int layers : {1, 2, 3, 4, 6}) {
+    FitOptions options;
+    options.layers = layers;
+    EXPECT_EQ(layer_heights(set, *pairs, options, progress).heights.size(),
+              static_cast<std::size_t>(layers));
   }
 }
 

@@ -169,8 +169,9 @@ LayerHeights layer_heights(const SampleSet& set,
     return {spread_evenly({-half, half}, count), depth};
   }
   std::vector<double> best;
-  for (int count = std::max(options.layers, 1); count <= std::max(options.layers, kMostFound);
-       ++count) {
+  const int least = std::max(options.layers, 1);
+  const int most_layers = options.layers > 0 ? options.layers : kMostFound;
+  for (int count = least; count <= most_layers; ++count) {
     double spread = 0.0;
     best = centres(found, count, spread);
     if (spread < kHeightResolution) break;

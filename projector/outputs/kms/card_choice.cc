@@ -21,15 +21,17 @@ Result<std::unique_ptr<KmsDevice>> choose_card(const KmsCards& cards, std::strin
   std::unique_ptr<KmsDevice> chosen;
   std::unique_ptr<KmsDevice> dark;  // has the socket, with nothing in it
   std::size_t fitting = 0;
+  std::size_t so_named = 0;  // sockets
   for (const std::filesystem::path& path : cards.paths) {
     Result<std::unique_ptr<KmsDevice>> device = cards.open(path);
-    if (device) (*device)->drop_master();  // the first to open a card is its master, unasked
     const Result<std::vector<KmsConnector>> sockets =
         device ? sockets_of(**device) : tl::unexpected<Error>(device.error());
+    // The first to open a card is its master, unasked; who is not gets no display asked.
+    if (device) (*device)->drop_master();
     if (!sockets) {
       list += fmt::format("\n  {}: {}", path.string(), sockets.error().what);
       // A card that shows nothing will not hide a display; one that is not there yet may.
-      if (sockets.error().code != Errc::kUnavailable) may_come = true;
+      if (device || sockets.error().code != Errc::kUnavailable) may_come = true;
       continue;
     }
     opened = true;
@@ -39,6 +41,7 @@ Result<std::unique_ptr<KmsDevice>> choose_card(const KmsCards& cards, std::strin
     bool has_display = false;
     for (const KmsConnector& each : *sockets) {
       if (!fits(each, connector)) continue;
+      if (each.name == connector) ++so_named;
       (each.connected ? has_display : has_socket) = true;
     }
     if (has_display && fitting++ == 0) {
@@ -48,10 +51,12 @@ Result<std::unique_ptr<KmsDevice>> choose_card(const KmsCards& cards, std::strin
     }
   }
   if (!opened) return fail(Errc::kUnavailable, "no card can show a picture:{}", list);
-  if (fitting > 1 && !connector.empty())
+  // Which of them has a display just now must not decide: the projector may be off.
+  if (!connector.empty() && std::max(fitting, so_named) > 1)
     return fail(Errc::kInvalidOption,
-                "{} cards have a display \"{}\"; set device too, to one of these:{}",
-                fitting,
+                "{} cards have a {} \"{}\"; set device too, to one of these:{}",
+                std::max(fitting, so_named),
+                so_named > 1 ? "socket" : "display",
                 connector,
                 list);
   if (chosen) return chosen;

@@ -21,8 +21,8 @@ struct KmsCards {
 /// The card with the display that choose_display() takes for this connector; with an empty text,
 /// the first that has any. Only the card that is chosen stays open. Errors, all with a list of
 /// every socket of every card: kNotFound (no card), kInvalidOption (no such display though every
-/// socket has one that says its name; or such displays on several cards), kUnavailable (none
-/// connected, or it may be one that is off or of a card that cannot be opened).
+/// socket has one that says its name; or several cards have such a display or socket), kUnavailable
+/// (none connected, or it may be one that is off or of a card that cannot be opened).
 [[nodiscard]] Result<std::unique_ptr<KmsDevice>> choose_card(const KmsCards& cards,
                                                              std::string_view connector);
 

@@ -62,6 +62,15 @@ TEST_F(CardChoiceTest, ADisplayIsFoundOnWhateverCardItIs) {
     EXPECT_EQ(opened(name), "/dev/dri/card0 DP-1") << name;
 }
 
+TEST_F(CardChoiceTest, TheSameDisplayOnTwoCardsIsRefused) {
+  stage_.connectors[0].edid = desk_.connectors[0].edid;
+  const auto output = open("DELL");
+  ASSERT_FALSE(output);
+  EXPECT_EQ(output.error().code, Errc::kInvalidOption);
+  EXPECT_NE(output.error().what.find("2 cards have a display \"DELL\""), std::string::npos)
+      << output.error().what;
+}
+
 TEST_F(CardChoiceTest, TheOtherCardIsLeftAlone) {
   ASSERT_TRUE(open("EPSON PJ"));
   EXPECT_EQ(desk_.masters_asked, 0);
@@ -105,16 +114,21 @@ TEST_F(CardChoiceTest, AProjectorThatIsOffOnAnotherCardIsTriedAgain) {
       << by_socket.error().what;
 }
 
-TEST_F(CardChoiceTest, TheSameNameOnTwoCardsGoesToTheOneWithADisplayOrIsRefused) {
+TEST_F(CardChoiceTest, ASocketThatTwoCardsHaveIsRefusedWhicheverHasADisplayJustNow) {
   stage_.connectors[0].name = "DP-1";
-  const auto output = open("DP-1");
-  ASSERT_FALSE(output);
-  EXPECT_EQ(output.error().code, Errc::kInvalidOption);
-  EXPECT_NE(output.error().what.find("set device too"), std::string::npos) << output.error().what;
-  desk_.connectors[0].connected = false;
-  EXPECT_EQ(opened("DP-1"), "/dev/dri/card1 DP-1");
-  stage_.connectors[0].connected = false;
-  EXPECT_EQ(open("DP-1").error().code, Errc::kUnavailable);
+  for (const auto& [at_desk, on_stage] : {std::pair(true, true),
+                                          std::pair(true, false),
+                                          std::pair(false, true),
+                                          std::pair(false, false)}) {
+    desk_.connectors[0].connected = at_desk;
+    stage_.connectors[0].connected = on_stage;
+    const auto output = open("DP-1");
+    ASSERT_FALSE(output);
+    EXPECT_EQ(output.error().code, Errc::kInvalidOption);
+    EXPECT_NE(output.error().what.find("2 cards have a socket \"DP-1\"; set device too"),
+              std::string::npos)
+        << output.error().what;
+  }
   options_.device = stage_.path;
   stage_.connectors[0].connected = desk_.connectors[0].connected = true;
   EXPECT_EQ(opened("DP-1"), "/dev/dri/card1 DP-1");

@@ -9,7 +9,6 @@ namespace {
 
 Status add_displays(const std::filesystem::path& path, std::vector<KmsDisplay>& displays) {
   VENEER_ASSIGN(const std::unique_ptr<KmsDevice> device, open_kms_device(path));
-  device->drop_master();  // the first to open a card is its master, unasked
   VENEER_ASSIGN(const KmsResources resources, device->resources());
   for (const KmsId id : resources.connectors) {
     VENEER_ASSIGN(const KmsConnector connector, device->connector(id, true));

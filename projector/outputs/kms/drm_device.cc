@@ -6,6 +6,7 @@
 #include <libudev.h>
 #include <poll.h>
 #include <sys/mman.h>
+#include <sys/stat.h>
 #include <xf86drm.h>
 #include <xf86drmMode.h>
 
@@ -305,7 +306,7 @@ class DrmDevice final : public KmsDevice {
     while (monitor_) {
       const UdevDevice event(udev_monitor_receive_device(monitor_.get()));
       if (!event) break;
-      any = true;
+      any = any || is_ours(event.get());
     }
     return any;
   }
@@ -327,6 +328,17 @@ class DrmDevice final : public KmsDevice {
     const int error = errno;
     const Errc code = error == ENODEV ? Errc::kDisconnected : Errc::kUnavailable;
     return fail(code, "{}: {}: {}", path_, doing, std::strerror(error));
+  }
+
+  /// What changes at another card is not asked about: that would hold frames up.
+  [[nodiscard]] bool is_ours(udev_device* event) const {
+    struct stat node {};
+    if (::fstat(fd_.value(), &node) != 0) return true;
+    // An event is the card's, or of a socket of it.
+    for (udev_device* each = event; each != nullptr; each = udev_device_get_parent(each)) {
+      if (udev_device_get_devnum(each) == node.st_rdev) return true;
+    }
+    return false;
   }
 
   void read_flips() {

@@ -77,7 +77,8 @@ KmsMode fake_mode(int width, int height, double refresh_hz, bool preferred) {
   return mode;
 }
 
-FakeKmsDevice::FakeKmsDevice(FakeCard& card, VirtualClock& clock) : card_(card), clock_(clock) {
+FakeKmsDevice::FakeKmsDevice(FakeCard& card, VirtualClock& clock)
+    : card_(card), clock_(clock), master_(!card.other_master) {
   for (std::size_t i = 0; i < card.connectors.size(); ++i) {
     const KmsId id = connector_id(i);
     values_[{id, "CRTC_ID"}] = 0;
@@ -221,7 +222,8 @@ Result<KmsConnector> FakeKmsDevice::connector(KmsId id, bool probe) {
   found.name = fake.name;
   found.connected = fake.connected;
   Known& known = known_[id];
-  if (probe) known = fake.connected ? Known{fake.modes, fake.edid} : Known{};
+  if (probe && master_ && !card_.other_master)
+    known = fake.connected ? Known{fake.modes, fake.edid} : Known{};
   found.modes = known.modes;
   found.edid = known.edid;
   for (std::size_t k = 0; k < static_cast<std::size_t>(card_.crtcs); ++k)

@@ -91,7 +91,8 @@ struct FakeCard {
 
 /// A KmsDevice on a virtual clock, with retraces at multiples of the period, that takes what the
 /// kernel takes and refuses what it refuses. A change of what is plugged in is known at once, but
-/// modes and EDID are those of the last probe.
+/// modes and EDID are those of the last probe, which only the master has made: who opens it, where
+/// no other program is.
 class FakeKmsDevice final : public KmsDevice {
  public:
   FakeKmsDevice(FakeCard& card, VirtualClock& clock);
@@ -163,7 +164,7 @@ class FakeKmsDevice final : public KmsDevice {
 
   FakeCard& card_;
   VirtualClock& clock_;
-  bool master_ = false;
+  bool master_;
   std::map<KmsId, Known> known_;
   Values values_;
   std::map<KmsId, std::string> blobs_;

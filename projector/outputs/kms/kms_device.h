@@ -112,7 +112,8 @@ class KmsDevice {
 
   [[nodiscard]] virtual Result<KmsResources> resources() = 0;
   /// @param probe  asks the display itself, which may take a tenth of a second; else what the
-  ///               kernel knows.
+  ///               kernel knows. Asking is the master's right: to others the kernel says what it
+  ///               knows (Linux 5.15, drm_mode_getconnector).
   [[nodiscard]] virtual Result<KmsConnector> connector(KmsId id, bool probe) = 0;
   [[nodiscard]] virtual Result<std::vector<KmsProperty>> properties(KmsId object, KmsKind kind) = 0;
   [[nodiscard]] virtual Result<std::string> blob(KmsId id) = 0;
