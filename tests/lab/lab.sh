@@ -23,14 +23,16 @@ need_users() {
   [[ -r /etc/shadow ]] || { echo "lab: /etc/shadow cannot be read; run this part as root" >&2; return 1; }
 }
 
+# Gadgets and the controller, of this machine itself, that they are plugged into.
+usb_modules=$'dummy_hcd num=2\nlibcomposite\nusb_f_hid\nusb_f_fs\nusb_f_ss_lb\nusbhid\nhid_generic'
+
 v4l2() {
   MODULES="vivid node_types=0x101" LAB_SECONDS=150 "$kernel" "$work" "$bin/veneer_v4l2_lab_test"
 }
 
 usb() {
   need_users
-  MODULES=$'dummy_hcd num=2\nlibcomposite\nusb_f_hid\nusb_f_fs\nusb_f_ss_lb\nusbhid\nhid_generic' \
-    LAB_SECONDS=400 "$kernel" "$work" "$source/tests/lab/usb.sh" "$bin" "$source"
+  MODULES=$usb_modules LAB_SECONDS=400 "$kernel" "$work" "$source/tests/lab/usb.sh" "$bin" "$source"
 }
 
 kms() {
@@ -60,8 +62,8 @@ service() {
   rm -rf "$work/service"
   packages=("$source"/out/veneer_*.deb)
   [[ -f ${packages[-1]} ]] || { echo "no package in out/; make it: ./dev package" >&2; return 1; }
-  LAB_INIT=systemd LAB_SCREEN=96x72 LAB_OUT=$work/service LAB_SECONDS=700 \
-    "$kernel" "$work" "$source/tests/lab/service.sh" "${packages[-1]}" "$source" "$show"
+  MODULES=$usb_modules LAB_INIT=systemd LAB_SCREEN=96x72 LAB_OUT=$work/service LAB_SECONDS=800 \
+    "$kernel" "$work" "$source/tests/lab/service.sh" "${packages[-1]}" "$source" "$show" "$bin"
 }
 
 # Each in a process of its own, where the first error ends the part and no more.

@@ -10,7 +10,11 @@ play() {
   local wires fd
   wires=$(mktemp -d)
   mkfifo "$wires/to" "$wires/from"
-  "$bin/veneer_lab_usb_device" "$1" <"$wires/to" >"$wires/from" &
+  # Without the wires of others, which would never end then.
+  (
+    for fd in "${to[@]}" "${from[@]}"; do exec {fd}>&-; done
+    exec "$bin/veneer_lab_usb_device" "$1"
+  ) <"$wires/to" >"$wires/from" &
   player[$1]=$!
   exec {fd}>"$wires/to"
   to[$1]=$fd

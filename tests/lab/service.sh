@@ -1,14 +1,17 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# service.sh PACKAGE.deb SOURCE SHOW: in the emulated machine, with systemd as its first process and a
+# service.sh PACKAGE.deb SOURCE SHOW BIN: in the emulated machine, with systemd as its first process and a
 # display of the size of SHOW's profile: veneerd is installed from its package, shows what prepare_show.sh
-# made and is started, asked, misconfigured, hung, killed and stopped.
+# made and is started, asked, misconfigured, hung, killed, stopped, and left with devices on USB that BIN plays.
 set -euo pipefail
 package=$1
 source=$2
 show=$3
+bin=$4
 # shellcheck source=tests/lab/expect.sh
 . "$source/tests/lab/expect.sh"
+# shellcheck source=tests/lab/play.sh
+. "$source/tests/lab/play.sh"
 
 name=org.veneer.Veneer1
 object=/org/veneer/Veneer1
@@ -195,4 +198,37 @@ expect "it left the bus" fails busctl status "$name"
 expect "the journal has its states as fields" says '"VENEER_STATE"' journal VENEER_STATE=stopping
 expect "and its faults" says '"VENEER_FAULT"' journal VENEER_FAULT=configuration
 expect "at the levels of the journal" says '"PRIORITY" *: *"[0-7]"' journal VENEER_FAULT=configuration
+
+# --- tracker and light engine on USB, within the sandbox of its unit and as the user that it has there
+
+python3 - "$config" <<'PYTHON'
+import re, sys
+text = open(sys.argv[1]).read()
+text = re.sub(r'(?s)\[tracker\].*?(?=\[output\])', '[tracker]\ndriver = "polhemus"\n\n', text)
+open(sys.argv[1], "w").write(text + '\n[control]\ndriver = "dlpc350"\npoll_s = 1\n')
+PYTHON
+# A LIBERTY counts its stations from 1.
+sed -i 's/^tracker_body = 0/tracker_body = 1/' /etc/veneer/scene.toml
+play liberty
+play light-engine
+expect "a tracker is plugged in" tell liberty plug
+expect "and a light engine" tell light-engine plug
+expect "it starts with both" timeout 175 systemctl start veneerd
+expect_within "$patience" "the tracker tracks" says 'LIBERTY.*tracking' get Tracker
+expect_within "$patience" "the light engine says how it is" says 'DLPC350' get Projector
+expect_within "$patience" "it shows a picture" shows_a_picture
+with_devices=$(unit MainPID)
+expect "the tracker is pulled out" tell liberty unplug
+expect_within "$patience" "which is a fault" says '"tracker"' get Faults
+expect "the light engine is pulled out" tell light-engine unplug
+expect_within "$patience" "which is one too" says '"projector"' get Faults
+expect "the tracker is plugged in again" tell liberty plug
+expect_within "$patience" "its fault is over" fails says '"tracker"' get Faults
+expect_within "$patience" "it tracks again" says 'LIBERTY.*tracking' get Tracker
+expect "the light engine is plugged in again" tell light-engine plug
+expect_within "$patience" "its fault is over" fails says '"projector"' get Faults
+expect "all by one process" test "$(unit MainPID)" = "$with_devices"
+expect "it stops in time" timeout 30 systemctl stop veneerd
+stop liberty
+stop light-engine
 expect_end

@@ -7,8 +7,9 @@ bin=$1
 source=$2
 # shellcheck source=tests/lab/expect.sh
 . "$source/tests/lab/expect.sh"
+# shellcheck source=tests/lab/play.sh
+. "$source/tests/lab/play.sh"
 
-mount -t configfs none /sys/kernel/config
 mkdir -p /etc/udev/rules.d
 cp "$source"/etc/udev/*.rules /etc/udev/rules.d/
 systemd-sysusers "$source/etc/sysusers.d/veneer.conf"
@@ -20,28 +21,6 @@ status=0
 "$bin/veneer_usb_lab_test" --gtest_brief=1 || status=$?
 expect "the drivers hold their laws" test "$status" = 0
 
-# play KIND: such a device, which then hears what is told, until stop.
-play() {
-  coproc device { exec "$bin/veneer_lab_usb_device" "$1"; }
-  # shellcheck disable=SC2154  # coproc assigns it
-  player=$device_PID
-  # Copies, since subshells lose the descriptors of a coprocess.
-  exec 8>&"${device[1]}" 9<&"${device[0]}"
-  eval "exec ${device[1]}>&-"
-}
-stop() {
-  exec 8>&- 9<&-
-  wait "$player" || true
-}
-# tell LINE: to the device that is played, which then says the same, or a value.
-tell() {
-  local answer
-  echo "$1" >&8
-  IFS= read -r -t 30 answer <&9 || return 1
-  echo "$answer"
-  udevadm settle --timeout=20
-  [[ $answer != error* ]]
-}
 as() {
   local user=$1
   shift
@@ -64,7 +43,7 @@ hidraw_of() {
 }
 
 play light-engine
-expect "a light engine is plugged in" tell plug
+expect "a light engine is plugged in" tell light-engine plug
 mapfile -t nodes < <(hidraw_of 0451 6401)
 expect "it has two nodes" test "${#nodes[@]}" = 2
 rights "light engine" "${nodes[0]}"
@@ -72,23 +51,23 @@ control=(/run/veneer projector --json --driver dlpc350)
 expect "veneer projector tells its state" says '"led_levels"' \
   as veneer "${control[@]}" status
 expect "veneer projector blanks it" as veneer "${control[@]}" blank
-expect "its LEDs are off" says '^0$' tell "value 1A07"
+expect "its LEDs are off" says '^0$' tell light-engine "value 1A07"
 expect "a stranger is told which rule to install" says '60-veneer-projectors.rules' as nobody "${control[@]}" status
-expect "it is pulled out" tell unplug
-stop
+expect "it is pulled out" tell light-engine unplug
+stop light-engine
 
 play colorhug
-expect "a colorimeter is plugged in" tell plug
+expect "a colorimeter is plugged in" tell colorhug plug
 rights colorimeter "$(hidraw_of 273F 1004)"
-stop
+stop colorhug
 
 play liberty
-expect "a tracker is plugged in" tell plug
+expect "a tracker is plugged in" tell liberty plug
 for folder in /sys/bus/usb/devices/*; do
   if [[ $(cat "$folder/idVendor" 2>/dev/null) == 0f44 ]]; then
     rights tracker "$(printf '/dev/bus/usb/%03d/%03d' "$(cat "$folder/busnum")" "$(cat "$folder/devnum")")"
     expect "veneer track sees it" says 'LIBERTY' as veneer /run/veneer track list
   fi
 done
-stop
+stop liberty
 expect_end
