@@ -2,16 +2,14 @@
 #include "base/image_files.h"
 
 #include <gtest/gtest.h>
-#include <signal.h>
 #include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <cstdlib>
 #include <limits>
 
 #include "base/files.h"
 #include "base/random.h"
+#include "base/testing/full_disk.h"
 #include "base/testing/temporary_folder.h"
 
 namespace veneer {
@@ -139,8 +137,7 @@ TEST(Exr, KeepsWhatIsToBeKnownAboutThePicture) {
   EXPECT_FALSE(fs::exists(folder.path() / "b.exr"));
 }
 
-// A child whose files may not grow beyond a limit: what a full disk does to a write. The last part
-// of the file is written when it is closed.
+// The last part of the file is written when it is closed.
 TEST(Exr, OnAFullDiskIsWholeOrNotAtAll) {
   const TemporaryFolder folder;
   Image<float> pixels(40, 30);
@@ -151,19 +148,11 @@ TEST(Exr, OnAFullDiskIsWholeOrNotAtAll) {
   const auto size = static_cast<rlim_t>(fs::file_size(folder.path() / "whole.exr"));
   for (const rlim_t limit : {rlim_t{1}, rlim_t{300}, size / 2, size - 100, size - 1, size}) {
     const fs::path path = folder.path() / std::to_string(limit);
-    const pid_t child = ::fork();
-    ASSERT_GE(child, 0);
-    if (child == 0) {
-      ::signal(SIGXFSZ, SIG_IGN);
-      const rlimit most{limit, limit};
-      if (::setrlimit(RLIMIT_FSIZE, &most) != 0) ::_exit(10);
+    const int status = on_full_disk(limit, [&] {
       const Status written = write_exr(path, channels);
-      ::_exit(written ? 0 : written.error().code == Errc::kIo ? 1 : 2);
-    }
-    int status = 0;
-    ASSERT_EQ(::waitpid(child, &status, 0), child);
-    ASSERT_TRUE(WIFEXITED(status));
-    EXPECT_EQ(WEXITSTATUS(status), limit < size ? 1 : 0) << limit << " of " << size;
+      return written ? 0 : written.error().code == Errc::kIo ? 1 : 2;
+    });
+    EXPECT_EQ(status, limit < size ? 1 : 0) << limit << " of " << size;
     EXPECT_EQ(fs::exists(path), limit >= size) << limit << " of " << size;
   }
 }

@@ -3,14 +3,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <signal.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <fstream>
 
 #include "base/files.h"
+#include "base/testing/full_disk.h"
 #include "base/testing/temporary_folder.h"
 
 namespace veneer {
@@ -130,32 +127,22 @@ TEST(Journal, IsOpenToOneAtATime) {
   EXPECT_EQ(second.error().code, Errc::kUnavailable);
 }
 
-// A child whose files may not grow beyond a few hundred bytes: what a full disk does to a write.
 TEST(Journal, AFullDiskCostsOnlyTheFindingThatDidNotFit) {
   const TemporaryFolder folder;
-  const pid_t child = ::fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    ::signal(SIGXFSZ, SIG_IGN);
-    const rlimit limit{400, 400};
-    if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(10);
+  const int status = on_full_disk(400, [&] {
     auto journal = open(folder);
-    if (!journal) ::_exit(11);
+    if (!journal) return 11;
     int kept = 0;
     Status added;
     while ((added = journal->add("light", std::to_string(kept), kept))) ++kept;
     const bool explained = added.error().code == Errc::kIo &&
                            added.error().what.find("make room") != std::string::npos;
-    if (!explained || kept > 90) ::_exit(12);
-    ::_exit(100 + kept);
-  }
-  int status = 0;
-  ASSERT_EQ(::waitpid(child, &status, 0), child);
-  ASSERT_TRUE(WIFEXITED(status));
-  ASSERT_GE(WEXITSTATUS(status), 101) << "at least one finding must have fitted";
+    return explained && kept <= 90 ? 100 + kept : 12;
+  });
+  ASSERT_GE(status, 101) << "at least one finding must have fitted";
   const auto journal = open(folder);
   ASSERT_TRUE(journal) << journal.error().what;
-  EXPECT_EQ(static_cast<int>(journal->size()), WEXITSTATUS(status) - 100);
+  EXPECT_EQ(static_cast<int>(journal->size()), status - 100);
 }
 
 }  // namespace

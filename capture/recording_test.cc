@@ -3,10 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <signal.h>
 #include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
@@ -14,6 +11,7 @@
 #include "base/files.h"
 #include "base/image_files.h"
 #include "base/random.h"
+#include "base/testing/full_disk.h"
 #include "base/testing/temporary_folder.h"
 
 namespace veneer::capture {
@@ -301,34 +299,25 @@ TEST(Recording, IsOpenToOneAtATime) {
   EXPECT_TRUE(Recording::open(folder.path()));  // who only reads may
 }
 
-// A child whose files may not grow beyond a limit: what a full disk does to a write. Small limits
-// hit the pictures, larger ones the journal.
+// Small limits hit the pictures, larger ones the journal.
 TEST(Recording, AFullDiskCostsOnlyThePictureThatDidNotFit) {
   for (const rlim_t limit : {rlim_t{1}, rlim_t{300}, rlim_t{900}, rlim_t{2600}}) {
     const TemporaryFolder folder;
     ASSERT_TRUE(Recording::resume(folder.path(), small_plan(), kCamera));
-    const pid_t child = ::fork();
-    ASSERT_GE(child, 0);
-    if (child == 0) {
-      ::signal(SIGXFSZ, SIG_IGN);
-      const rlimit most{limit, limit};
-      if (::setrlimit(RLIMIT_FSIZE, &most) != 0) ::_exit(201);
+    const int kept = on_full_disk(limit, [&] {
       auto recording = Recording::resume(folder.path(), small_plan(), kCamera);
-      if (!recording) ::_exit(202);
-      for (int kept = 0; kept < 100; ++kept) {
-        const Shot shot{Target::kSample, 0, 0, 0, kept, false};
-        const Status added = recording->add(picture_of(shot));
-        if (added) continue;
-        const bool right = added.error().code == Errc::kIo && !recording->has(shot) &&
+      if (!recording) return 202;
+      for (int added = 0; added < 100; ++added) {
+        const Shot shot{Target::kSample, 0, 0, 0, added, false};
+        const Status status = recording->add(picture_of(shot));
+        if (status) continue;
+        const bool right = status.error().code == Errc::kIo && !recording->has(shot) &&
                            !fs::exists(recording->path_of(shot));
-        ::_exit(right ? kept : 203);
+        return right ? added : 203;
       }
-      ::_exit(204);
-    }
-    int status = 0;
-    ASSERT_EQ(::waitpid(child, &status, 0), child);
-    ASSERT_TRUE(WIFEXITED(status));
-    const int kept = WEXITSTATUS(status);
+      return 204;
+    });
+    ASSERT_GE(kept, 0) << limit;
     ASSERT_LE(kept, 100) << limit;
     EXPECT_EQ(kept > 0, limit >= 900) << limit;
     const auto recording = Recording::resume(folder.path(), small_plan(), kCamera);

@@ -19,6 +19,53 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::Vector4f;
 
+constexpr std::array kWeights{1.0, 0.25};
+
+/// A sphere under a sun and a lamp, seen from the side, and what it is drawn into.
+class Stage {
+ public:
+  Stage(int width, int height, GLenum format)
+      : width_(width),
+        height_(height),
+        profile_(example_profile(width, height, 8)),
+        target_(make_texture_2d(format, width, height)),
+        depth_(make_texture_2d(GL_DEPTH_COMPONENT32F, width, height)) {
+    glNamedFramebufferTexture(framebuffer_.id(), GL_COLOR_ATTACHMENT0, target_.id(), 0);
+    glNamedFramebufferTexture(framebuffer_.id(), GL_DEPTH_ATTACHMENT, depth_.id(), 0);
+  }
+
+  [[nodiscard]] const MeshBuffers& mesh() const { return mesh_; }
+  [[nodiscard]] Result<DrawPass> pass(const btf::ModelShader& shader,
+                                      const DrawOptions& options) const {
+    return DrawPass::create(shader, lights_, {5, 5}, profile_, options);
+  }
+  /// Over what is no frame of any material.
+  [[nodiscard]] std::vector<Vector4f> draw(const DrawPass& pass, double specular_weight) const {
+    DrawInput input;
+    input.eye_in_world = {-0.3, 0.2, 0.9};
+    input.specular_weight = specular_weight;
+    glClearNamedFramebufferfv(framebuffer_.id(), GL_COLOR, 0, Vector4f::Ones().eval().data());
+    pass.draw(framebuffer_.id(), mesh_, input);
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.id());
+    std::vector<Vector4f> pixels(static_cast<std::size_t>(width_) *
+                                 static_cast<std::size_t>(height_));
+    glReadPixels(0, 0, width_, height_, GL_RGBA, GL_FLOAT, pixels.data());
+    return pixels;
+  }
+
+ private:
+  int width_;
+  int height_;
+  calibration::ProjectorProfile profile_;
+  std::vector<Light> lights_{
+      DirectionalLight{Vector3d(0.3, 0.4, 0.85).normalized(), Vector3d::Constant(std::numbers::pi)},
+      PointLight{{0.3, -0.2, 0.6}, Vector3d(0.5, 0.9, 1.2)}};
+  MeshBuffers mesh_{*load_mesh("sphere")};
+  GlTexture target_;
+  GlTexture depth_;
+  GlFramebuffer framebuffer_ = make_framebuffer();
+};
+
 // What the angular cache draws of a model is what its shader draws, to the interpolation between
 // nodes that stand closer than the measured directions: on average the difference is small beside
 // the sample's 0.2 to 1.3, while a wrong cluster or component would show everywhere.
@@ -27,21 +74,7 @@ constexpr double kMeanCacheDifference = 4e-3;
 TEST(ModelShaders, CachedDrawsFollowThePerPixelDraw) {
   const auto context = EglContext::create();
   if (!context) GTEST_SKIP() << context.error().what;
-  constexpr int kWidth = 320;
-  constexpr int kHeight = 240;
-  const calibration::ProjectorProfile profile = example_profile(kWidth, kHeight, 8);
-  const MeshBuffers mesh(*load_mesh("sphere"));
-  const GlTexture target = make_texture_2d(GL_RGBA32F, kWidth, kHeight);
-  const GlTexture depth = make_texture_2d(GL_DEPTH_COMPONENT32F, kWidth, kHeight);
-  const GlFramebuffer framebuffer = make_framebuffer();
-  glNamedFramebufferTexture(framebuffer.id(), GL_COLOR_ATTACHMENT0, target.id(), 0);
-  glNamedFramebufferTexture(framebuffer.id(), GL_DEPTH_ATTACHMENT, depth.id(), 0);
-  const std::vector<Light> lights{
-      DirectionalLight{Vector3d(0.3, 0.4, 0.85).normalized(), Vector3d::Constant(std::numbers::pi)},
-      PointLight{{0.3, -0.2, 0.6}, Vector3d(0.5, 0.9, 1.2)}};
-  DrawInput input;
-  input.eye_in_world = {-0.3, 0.2, 0.9};
-  constexpr std::array kWeights{1.0, 0.25};
+  const Stage stage(320, 240, GL_RGBA32F);
   int tested = 0;
   for (const Fitted& fit : fitted()) {
     const btf::ModelShader shader = fit.material->shader();
@@ -52,22 +85,12 @@ TEST(ModelShaders, CachedDrawsFollowThePerPixelDraw) {
     for (const AngularCacheOptions& cache :
          {AngularCacheOptions{}, AngularCacheOptions{.spacing = 4, .most_turn = 0.2}}) {
       const auto pass =
-          DrawPass::create(shader,
-                           lights,
-                           {5, 5},
-                           profile,
-                           {.cache = cache, .filter = texel_filter(*fit.material, false)});
+          stage.pass(shader, {.cache = cache, .filter = texel_filter(*fit.material, false)});
       ASSERT_TRUE(pass) << pass.error().what;
-      for (const double weight : kWeights) {
-        input.specular_weight = weight;
-        pass->draw(framebuffer.id(), mesh, input);
-        glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer.id());
-        glReadPixels(
-            0, 0, kWidth, kHeight, GL_RGBA, GL_FLOAT, drawn.emplace_back(kWidth * kHeight).data());
-      }
+      for (const double weight : kWeights) drawn.push_back(stage.draw(*pass, weight));
       if (cache.spacing > 0) {
         ASSERT_NE(pass->cache(), nullptr);
-        EXPECT_GT(mesh.served(), 0.01);
+        EXPECT_GT(stage.mesh().served(), 0.01);
       }
     }
     for (std::size_t w = 0; w < kWeights.size(); ++w) {
@@ -105,42 +128,18 @@ constexpr double kMeanComputeDifference = 2e-4;
 TEST(ModelShaders, AreTheSameInAComputePass) {
   const auto context = EglContext::create();
   if (!context) GTEST_SKIP() << context.error().what;
-  constexpr int kWidth = 170;  // no whole groups
-  constexpr int kHeight = 121;
-  const calibration::ProjectorProfile profile = example_profile(kWidth, kHeight, 8);
-  const MeshBuffers mesh(*load_mesh("sphere"));
-  const GlTexture target = make_texture_2d(GL_RGBA16F, kWidth, kHeight);
-  const GlTexture depth = make_texture_2d(GL_DEPTH_COMPONENT32F, kWidth, kHeight);
-  const GlFramebuffer framebuffer = make_framebuffer();
-  glNamedFramebufferTexture(framebuffer.id(), GL_COLOR_ATTACHMENT0, target.id(), 0);
-  glNamedFramebufferTexture(framebuffer.id(), GL_DEPTH_ATTACHMENT, depth.id(), 0);
-  const std::vector<Light> lights{
-      DirectionalLight{Vector3d(0.3, 0.4, 0.85).normalized(), Vector3d::Constant(std::numbers::pi)},
-      PointLight{{0.3, -0.2, 0.6}, Vector3d(0.5, 0.9, 1.2)}};
-  DrawInput input;
-  input.eye_in_world = {-0.3, 0.2, 0.9};
-  constexpr std::array kWeights{1.0, 0.25};
+  const Stage stage(170, 121, GL_RGBA16F);  // no whole groups
   for (const Fitted& fit : fitted()) {
     SCOPED_TRACE(fit.name);
     const btf::ModelShader shader = fit.material->shader();
     std::vector<std::vector<Vector4f>> drawn;
     for (const Evaluation evaluation : {Evaluation::kFragment, Evaluation::kCompute}) {
       const auto pass =
-          DrawPass::create(shader,
-                           lights,
-                           {5, 5},
-                           profile,
-                           {.filter = texel_filter(*fit.material, fit.name == kWithMipLevels),
-                            .evaluation = evaluation});
+          stage.pass(shader,
+                     {.filter = texel_filter(*fit.material, fit.name == kWithMipLevels),
+                      .evaluation = evaluation});
       ASSERT_TRUE(pass) << pass.error().what;
-      for (const double weight : kWeights) {
-        input.specular_weight = weight;
-        glClearNamedFramebufferfv(framebuffer.id(), GL_COLOR, 0, Vector4f::Ones().eval().data());
-        pass->draw(framebuffer.id(), mesh, input);
-        glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer.id());
-        glReadPixels(
-            0, 0, kWidth, kHeight, GL_RGBA, GL_FLOAT, drawn.emplace_back(kWidth * kHeight).data());
-      }
+      for (const double weight : kWeights) drawn.push_back(stage.draw(*pass, weight));
     }
     for (std::size_t w = 0; w < kWeights.size(); ++w) {
       SCOPED_TRACE(fmt::format("specular weight {}", kWeights[w]));

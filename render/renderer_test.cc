@@ -1,148 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render/renderer.h"
 
-#include <Eigen/LU>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
-#include <numbers>
-#include <optional>
-#include <set>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "base/colour.h"
 #include "render/compensation.h"
-#include "render/egl_context.h"
-#include "render/internal_testing.h"
+#include "render/internal_renderer_testing.h"
 
 namespace veneer::render {
 namespace {
 
 using Eigen::Vector3d;
 
-constexpr int kWidth = 160;
-constexpr int kHeight = 120;
-constexpr double kPi = std::numbers::pi;
-// The target is stored in half floats, rounded or cut: at most one step of 2^-10 relative per
-// component of XYZ, which the matrix back to RGB widens about fourfold.
-constexpr double kHalfFloatTolerance = 4e-3;
-
-Scene scene_of(const char* mesh, const Light& light) {
-  Scene scene;
-  scene.mesh = *load_mesh(mesh);
-  scene.lights = {light};
-  return scene;
-}
-Scene plate_scene() {
-  // pi lux on every channel: the luminance drawn is the sample itself.
-  return scene_of("plate",
-                  DirectionalLight{Vector3d(0.3, 0.5, 0.8).normalized(), Vector3d::Constant(kPi)});
-}
-
-FrameInput tilted_frame() {
-  FrameInput input;
-  input.eye_in_world = {-0.4, 0.3, 0.9};
-  input.world_from_object.rotation = Eigen::AngleAxisd(0.3, Vector3d::UnitX()) *
-                                     Eigen::AngleAxisd(-0.4, Vector3d::UnitY()) *
-                                     Eigen::AngleAxisd(0.2, Vector3d::UnitZ());
-  input.world_from_object.translation = {0.02, -0.03, 0.05};
-  return input;
-}
-
-// The projector's ray through a point of its raster, in the object's frame, by hand.
-struct Ray {
-  Vector3d from;
-  Vector3d along;
-};
-Ray ray_in_object(const calibration::ProjectorGeometry& g,
-                  const FrameInput& input,
-                  double x,
-                  double y) {
-  const RigidTransform object_from_projector =
-      input.world_from_object.inverse() * g.world_from_projector;
-  return {object_from_projector.translation,
-          object_from_projector.rotation * Vector3d((x - g.cx) / g.fx, (y - g.cy) / g.fy, 1.0)};
-}
-
-// The point of the plate under a point of the raster, in the object's frame; none off the plate.
-std::optional<Vector3d> point_on_plate(const calibration::ProjectorGeometry& g,
-                                       const FrameInput& input,
-                                       double x,
-                                       double y) {
-  const Ray ray = ray_in_object(g, input, x, y);
-  const Vector3d point = ray.from - ray.along * (ray.from.z() / ray.along.z());
-  if (std::abs(point.x()) > 0.1 || std::abs(point.y()) > 0.1) return std::nullopt;
-  return point;
-}
-
-class RendererTest : public ::testing::Test {
- protected:
-  void SetUp() override {
-    const auto context = EglContext::create();
-    if (!context) GTEST_SKIP() << context.error().what;
-  }
-
-  [[nodiscard]] std::unique_ptr<Renderer> make(const Scene& scene,
-                                               const btf::Material& material,
-                                               const DrawingOptions& drawing = {},
-                                               const RendererOptions& options = {}) const {
-    auto renderer = Renderer::create(scene, one_level(material, drawing), profile_, options);
-    if (!renderer) throw std::runtime_error(renderer.error().what);
-    return std::move(*renderer);
-  }
-
-  // Draws the plate in a material that shows three numbers as linear RGB, and compares them with
-  // `expected(point in the object's frame)` wherever a pixel is safely on the plate.
-  template <class Expected>
-  void expect_everywhere(const Scene& scene,
-                         const btf::Material& material,
-                         const Expected& expected) {
-    const FrameInput input = tilted_frame();
-    const auto renderer = make(scene, material);
-    renderer->draw(input);
-    Image<Rgb32f> target(kWidth, kHeight);
-    renderer->read_target(target.view());
-    int compared = 0;
-    for (int y = 0; y < kHeight; ++y) {
-      for (int x = 0; x < kWidth; ++x) {
-        const auto point = point_on_plate(profile_.geometry, input, x + 0.5, y + 0.5);
-        const bool drawn = target(x, y).norm() > 0;
-        if (!point) continue;
-        if (!drawn) {  // only the outermost pixels may differ, by rounding
-          EXPECT_GT(std::max(std::abs(point->x()), std::abs(point->y())), 0.0995) << x << ", " << y;
-          continue;
-        }
-        const Vector3d shown = srgb_from_xyz() * target(x, y).cast<double>();
-        const Vector3d wanted = expected(*point);
-        ASSERT_LT((shown - wanted).norm(), kHalfFloatTolerance * std::max(1.0, wanted.norm()))
-            << "pixel " << x << ", " << y << ": " << shown.transpose() << " instead of "
-            << wanted.transpose();
-        ++compared;
-      }
-    }
-    EXPECT_GT(compared, 500);
-  }
-
-  calibration::ProjectorProfile profile_ = example_profile(kWidth, kHeight, 8);
-};
-
 TEST_F(RendererTest, PutsTextureCoordinatesWhereProjectionByHandPutsThem) {
   expect_everywhere(
       plate_scene(), ShaderMaterial("return vec3(uv, 0.5);"), [](const Vector3d& point) {
         return Vector3d(point.x() / 0.2 + 0.5, 0.5 - point.y() / 0.2, 0.5);
       });
-}
-
-TEST_F(RendererTest, RepeatsTheSample) {
-  Scene scene = plate_scene();
-  scene.texture_repeats = {6, 3};
-  expect_everywhere(scene, ShaderMaterial("return vec3(uv, 0.5);"), [](const Vector3d& point) {
-    return Vector3d(6 * (point.x() / 0.2 + 0.5), 3 * (0.5 - point.y() / 0.2), 0.5);
-  });
 }
 
 TEST_F(RendererTest, GivesModelsTheViewInTheLocalFrame) {
@@ -179,34 +60,6 @@ TEST_F(RendererTest, AddsUpLightsAndFollowsTheInverseSquareLaw) {
         return Vector3d::Constant(to_sun.z()) +
                lamp.intensity_rgb / kPi * (to_lamp.z() / std::pow(to_lamp.norm(), 3));
       });
-}
-
-// A texture of 4 x 4 texels, all different; the first is the upper left one of the sample, which is
-// the upper left one of the plate seen from outside.
-TEST_F(RendererTest, ShowsTheFirstTexelAtTheUpperLeft) {
-  btf::ModelShader shader;
-  shader.source =
-      "uniform sampler2D Texels;"
-      "vec3 btf_radiance(vec2 uv, vec3 view, vec3 light) {"
-      "return texelFetch(Texels, ivec2(uv * 4.0), 0).rgb; }";
-  btf::ModelTexture texture;
-  texture.sampler = "Texels";
-  texture.format = btf::TexelFormat::kRgba32f;
-  texture.width = texture.height = 4;
-  std::vector<float> texels;
-  for (int row = 0; row < 4; ++row) {
-    for (int column = 0; column < 4; ++column)
-      texels.insert(texels.end(), {0.25F + 0.1F * column, 0.25F + 0.1F * row, 0.5F, 1.0F});
-  }
-  const auto* bytes = reinterpret_cast<const std::byte*>(texels.data());
-  texture.data.assign(bytes, bytes + texels.size() * sizeof(float));
-  shader.textures.push_back(texture);
-  expect_everywhere(plate_scene(), ShaderMaterial(shader), [](const Vector3d& point) {
-    // Within rounding of a border the pixel may show either texel; the plate's tilt puts few there.
-    const auto texel = [](double part) { return std::clamp(static_cast<int>(part * 4), 0, 3); };
-    return Vector3d(
-        0.25 + 0.1 * texel(point.x() / 0.2 + 0.5), 0.25 + 0.1 * texel(0.5 - point.y() / 0.2), 0.5);
-  });
 }
 
 // The weight reaches a material's shader, drawn per pixel or as the mean of texels, in either
@@ -251,111 +104,6 @@ TEST_F(RendererTest, RefusesTheAngularCacheInAComputePass) {
   for (const char* text : {"", "Compute", "compute "}) EXPECT_FALSE(parse_evaluation(text));
 }
 
-btf::ModelShader shader_of_levels() {
-  btf::ModelShader shader;
-  shader.source =
-      "int texel_level = 0;\n"
-      "vec3 btf_radiance(vec2 uv, vec3 view, vec3 light) { return vec3(texel_level + 1); }";
-  return shader;
-}
-
-// A material that shows which mip level is read.
-class LevelMaterial final : public ShaderMaterial {
- public:
-  LevelMaterial(int side, int levels)
-      : ShaderMaterial(shader_of_levels()), side_(side), levels_(levels) {}
-  [[nodiscard]] int width() const override { return side_; }
-  [[nodiscard]] int height() const override { return side_; }
-  [[nodiscard]] int mip_levels() const override { return levels_; }
-
- private:
-  int side_;
-  int levels_;
-};
-
-TEST_F(RendererTest, ReadsTheMipLevelThatSuitsThePixel) {
-  constexpr double kNearlyBetween = 0.1;  // where interpolation in float may choose the other
-  const FrameInput input = tilted_frame();
-  constexpr int kLevels = 5;
-  std::set<int> seen;
-  for (const int side : {16, 50, 100, 220, 500, 3000})
-    for (const bool average : {false, true}) {
-      const auto renderer =
-          make(plate_scene(), LevelMaterial(side, kLevels), {.average_texels = average});
-      renderer->draw(input);
-      Image<Rgb32f> target(kWidth, kHeight);
-      renderer->read_target(target.view());
-      int compared = 0;
-      for (int y = 0; y < kHeight; ++y)
-        for (int x = 0; x < kWidth; ++x) {
-          const auto at = [&](double dx, double dy) {
-            return point_on_plate(profile_.geometry, input, x + 0.5 + dx, y + 0.5 + dy);
-          };
-          if (!at(-2, -2) || !at(2, -2) || !at(-2, 2) || !at(2, 2)) continue;
-          const Vector3d width =
-              (*at(0.5, 0) - *at(-0.5, 0)).cwiseAbs() + (*at(0, 0.5) - *at(0, -0.5)).cwiseAbs();
-          const double level =
-              std::clamp(std::log2(width.maxCoeff() / 0.2 * side), 0.0, kLevels - 1.0);
-          if (std::abs(level - std::floor(level) - 0.5) < kNearlyBetween) continue;
-          const auto shown = (srgb_from_xyz() * target(x, y).cast<double>()).y() - 1;
-          ASSERT_NEAR(shown, std::round(level), 0.01) << side << " texels at " << x << ", " << y;
-          seen.insert(static_cast<int>(std::round(level)));
-          ++compared;
-        }
-      EXPECT_GT(compared, 100) << side;
-    }
-  EXPECT_EQ(seen, (std::set{0, 1, 2, 3, 4}));
-}
-
-// A checkerboard of black and white texels, each a little larger than a pixel.
-TEST_F(RendererTest, AveragesTheTexelsUnderAPixel) {
-  const ShaderMaterial checker(
-      "ivec2 t = ivec2(floor(uv * 40.0)); return vec3(float((t.x + t.y) & 1));", 40, 40);
-  Scene scene = plate_scene();
-  const FrameInput input{{0, 0, 1}, {}, 0};
-  const auto draw = [&](bool average) {
-    const auto renderer = make(scene, checker, {.average_texels = average});
-    renderer->draw(input);
-    Image<Rgb32f> target(kWidth, kHeight);
-    renderer->read_target(target.view());
-    return target;
-  };
-  const Image<Rgb32f> nearest = draw(false);
-  const Image<Rgb32f> averaged = draw(true);
-  // The truth: 16 x 16 rays through each pixel. The pixel's sides on the plate are not quite the
-  // texels' directions (the projector looks down a little), and the footprint is taken as their
-  // box.
-  constexpr int kRays = 16;
-  double nearest_error = 0;
-  double averaged_error = 0;
-  int compared = 0;
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
-      double white = 0;
-      bool inside = true;
-      for (int i = 0; i < kRays * kRays; ++i) {
-        const auto point = point_on_plate(
-            profile_.geometry, input, x + (i % kRays + 0.5) / kRays, y + (i / kRays + 0.5) / kRays);
-        inside = inside && point;
-        if (!point) break;
-        const int column = static_cast<int>(std::floor((point->x() / 0.2 + 0.5) * 40));
-        const int row = static_cast<int>(std::floor((0.5 - point->y() / 0.2) * 40));
-        white += ((column + row) & 1) / double(kRays * kRays);
-      }
-      if (!inside) continue;
-      const auto shown = [&](const Image<Rgb32f>& image) {
-        return (srgb_from_xyz() * image(x, y).cast<double>()).y();
-      };
-      nearest_error += std::abs(shown(nearest) - white);
-      averaged_error += std::abs(shown(averaged) - white);
-      ++compared;
-    }
-  }
-  ASSERT_GT(compared, 500);
-  EXPECT_GT(nearest_error / compared, 0.1) << "nothing to average";
-  EXPECT_LT(averaged_error / compared, 0.02);
-}
-
 TEST_F(RendererTest, ShowsTheNearSideOfASphere) {
   const Scene scene =
       scene_of("sphere", DirectionalLight{Vector3d::UnitZ(), Vector3d::Constant(kPi)});
@@ -370,7 +118,7 @@ TEST_F(RendererTest, ShowsTheNearSideOfASphere) {
   int compared = 0;
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
-      const Ray ray = ray_in_object(profile_.geometry, input, x + 0.5, y + 0.5);
+      const Ray ray = ray_in_object(input, x + 0.5, y + 0.5);
       const double a = ray.along.squaredNorm();
       const double b = ray.along.dot(ray.from);
       const double discriminant = b * b - a * (ray.from.squaredNorm() - 0.01);
@@ -425,7 +173,7 @@ TEST_F(RendererTest, CodesSendTheTarget) {
           continue;
         }
         ++covered;
-        const auto point = point_on_plate(g, input, x + 0.5, y + 0.5);
+        const auto point = point_on_plate(input, x + 0.5, y + 0.5);
         if (!point) continue;
         const Vector3d to_projector =
             (input.world_from_object.inverse() * g.world_from_projector.translation) - *point;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A fit over the processes of mpirun: the same material, and none where a process dies.
 #include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cmath>
@@ -15,6 +13,7 @@
 #include "base/random.h"
 #include "base/testing/temporary_folder.h"
 #include "btf/material.h"
+#include "tests/program_child.h"
 
 namespace veneer {
 namespace {
@@ -95,24 +94,14 @@ class MpiFit : public testing::Test {
                                          arguments,
                                          at("out").string(),
                                          at("err").string());
-    const pid_t child = ::fork();
-    if (child == 0) {
-      ::execl("/bin/sh", "sh", "-c", line.c_str(), nullptr);
-      ::_exit(127);
-    }
-    return child;
-  }
-  static int wait(pid_t child) {
-    int status = 0;
-    VENEER_CHECK(::waitpid(child, &status, 0) == child);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    return start_shell(line);
   }
   static std::string errors() { return read_text(at("err")).value_or(""); }
 
   static std::unique_ptr<btf::Material> fit(int processes, const std::string& arguments) {
     const fs::path out = at(fmt::format("on{}.safetensors", processes));
     fs::remove(out);
-    EXPECT_EQ(wait(start(processes, "fit -o " + out.string() + " " + arguments)), kExitDone)
+    EXPECT_EQ(wait_for(start(processes, "fit -o " + out.string() + " " + arguments)), kExitDone)
         << errors();
     auto material = btf::load_material(out);
     EXPECT_TRUE(material) << material.error().what;
@@ -161,7 +150,7 @@ TEST_F(MpiFit, AnErrorIsToldOnce) {
         std::tuple{"--model lafortune " + at("set.btfset").string(),
                    "not shared among processes",
                    kExitUsage}}) {
-    EXPECT_EQ(wait(start(2, "fit -o " + at("none").string() + " " + arguments)), exit_code);
+    EXPECT_EQ(wait_for(start(2, "fit -o " + at("none").string() + " " + arguments)), exit_code);
     const std::string text = errors();
     const std::size_t first = text.find(message);
     ASSERT_NE(first, std::string::npos) << text;
@@ -203,7 +192,7 @@ TEST_F(MpiFit, ADeadProcessEndsTheJobAndLeavesNoMaterial) {
   ASSERT_TRUE(rank);
   std::this_thread::sleep_for(std::chrono::milliseconds(500));
   ASSERT_EQ(::kill(*rank, SIGKILL), 0);
-  EXPECT_NE(wait(job), kExitDone);
+  EXPECT_NE(wait_for(job), kExitDone);
   EXPECT_NE(errors().find("signal 9"), std::string::npos) << errors();
   EXPECT_TRUE(fs::is_empty(at("killed")));
 }

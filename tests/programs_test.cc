@@ -2,23 +2,19 @@
 // The programs as a person uses them: exit codes, messages, and nothing half-written.
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
-#include <sys/wait.h>
 
 #include <algorithm>
-#include <array>
-#include <chrono>
-#include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <optional>
-#include <thread>
+#include <string>
 #include <utility>
 
 #include "base/files.h"
 #include "base/image_files.h"
 #include "base/safetensors.h"
-#include "base/testing/temporary_folder.h"
-#include "tests/program.h"
+#include "tests/programs_fixture.h"
 
 namespace veneer {
 namespace {
@@ -47,55 +43,6 @@ class Scratch {
  private:
   fs::path path_;
   std::optional<std::string> before_;
-};
-
-/// A tiny polarised sample set, a material fitted to it, a profile and a run's configuration, made
-/// once by the programs themselves.
-class ProgramsTest : public testing::Test {
- protected:
-  static void SetUpTestSuite() {
-    folder_ = new TemporaryFolder;
-    const std::string here = folder_->path().string();
-    const std::string etc = VENEER_ETC;
-    for (const std::string& line :
-         {"veneer synthesize cloth --size 8 --views 25 --lights 25 --samples 1 -o " + here +
-              "/cloth.btfset",
-          "veneer fit " + here +
-              "/cloth.btfset --model texel-colours --components 3+1 --clusters 2 --angular 8 -o " +
-              here + "/material.safetensors",
-          "veneer calibrate --yes --board-poses 5 --bench " + etc + "/benches/demo.toml -o " +
-              here + "/profile"}) {
-      const Outcome outcome = run(line);
-      ASSERT_EQ(outcome.exit_code, 0) << line << "\n" << outcome.err;
-    }
-    for (const char* name : {"veneer.toml", "scene.toml"}) {
-      ASSERT_TRUE(
-          write_text(folder_->path() / name, read_text(fs::path(etc) / "demo" / name).value()));
-    }
-  }
-  static void TearDownTestSuite() {
-    delete folder_;
-    folder_ = nullptr;
-  }
-
-  static fs::path at(const std::string& name) { return folder_->path() / name; }
-  static std::string text(const std::string& name) { return at(name).string(); }
-  /// A copy of the sample set that a test may damage.
-  static fs::path copy_of_set(const std::string& name) {
-    fs::remove_all(at(name));
-    fs::copy(at("cloth.btfset"), at(name), fs::copy_options::recursive);
-    return at(name);
-  }
-  /// Puts a copy of the profile in a place, as a calibration does.
-  static void publish_profile(const std::string& name) {
-    StagedFolder staged = StagedFolder::create(at(name)).value();
-    for (const auto& entry : fs::directory_iterator(at("profile")))
-      fs::copy(entry.path(), staged.path() / entry.path().filename());
-    ASSERT_TRUE(staged.commit());
-  }
-  static void cut_in_half(const fs::path& file) { fs::resize_file(file, fs::file_size(file) / 2); }
-
-  static inline TemporaryFolder* folder_ = nullptr;
 };
 
 // A measured view, one between measured ones, a light, and what there is no data for.
@@ -223,40 +170,6 @@ TEST_F(ProgramsTest, TheDemoLeavesAForeignFolderAlone) {
   EXPECT_TRUE(fs::exists(at("mine") / "pictures" / "holiday.png"));
 }
 
-TEST_F(ProgramsTest, AMeshWithoutTextureCoordinatesIsRefused) {
-  ASSERT_TRUE(write_text(at("bare.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
-  std::string scene = read_text(at("scene.toml")).value();
-  scene.replace(scene.find("\"sphere\""), 8, "\"bare.obj\"");
-  ASSERT_TRUE(write_text(at("bare.toml"), scene));
-  EXPECT_TRUE(fails(run("veneerd --config " + text("veneer.toml") +
-                        " --set 'scene=\"bare.toml\"' --set frames=1"),
-                    1,
-                    "texture coordinates"));
-}
-
-TEST_F(ProgramsTest, UnknownKeysAreNamedWithTheirLine) {
-  std::string config = read_text(at("veneer.toml")).value();
-  ASSERT_TRUE(write_text(at("wrong.toml"), "framerate_hz = 60\n" + config));
-  EXPECT_TRUE(fails(
-      run("veneerd --config " + text("wrong.toml")), 2, "wrong.toml:1: framerate_hz: unknown key"));
-  EXPECT_TRUE(
-      fails(run("veneerd --config " + text("veneer.toml") + " --set tracker.rate=1"), 2, "rate"));
-  const std::string scene = read_text(at("scene.toml")).value();
-  ASSERT_TRUE(write_text(at("odd.toml"), scene + "\ncolor = 3\n"));
-  EXPECT_TRUE(fails(
-      run("veneerd --config " + text("veneer.toml") + " --set 'scene=\"odd.toml\"'"), 2, "color"));
-}
-
-TEST_F(ProgramsTest, ADamagedProfileIsRefused) {
-  fs::remove_all(at("bad-profile"));
-  fs::copy(at("profile"), at("bad-profile"), fs::copy_options::recursive);
-  cut_in_half(at("bad-profile") / "profile.json");
-  EXPECT_TRUE(
-      fails(run("veneerd --config " + text("veneer.toml") + " --set 'profile=\"bad-profile\"'"),
-            1,
-            "profile.json"));
-}
-
 TEST_F(ProgramsTest, JsonIsAloneOnStandardOutput) {
   const Outcome outcome = run("veneer evaluate " + text("cloth.btfset") + " " +
                               text("material.safetensors") + " --json");
@@ -345,42 +258,6 @@ TEST_F(ProgramsTest, AGovernorIsNotTimedWhereNothingCanBeSeen) {
   EXPECT_TRUE(fails(run("veneer bench governor --busy -1"), 2, "--busy"));
 }
 
-TEST_F(ProgramsTest, TheDaemonMakesTheSameFramesTwice) {
-  for (const char* name : {"first", "second"}) {
-    const Outcome outcome =
-        run(fmt::format("veneerd --config {} --set frames=3 --set 'output.folder=\"{}\"' --set "
-                        "'summary=\"{}.json\"'",
-                        text("veneer.toml"),
-                        name,
-                        name));
-    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  }
-  const auto summary = nlohmann::json::parse(read_text(at("first.json")).value());
-  EXPECT_EQ(summary.at("frames"), 3);
-  EXPECT_GT(summary.at("frame_ms_p50"), 0);
-  for (int frame = 0; frame < 3; ++frame) {
-    const std::string name = fmt::format("frame-{:06}.png", frame);
-    EXPECT_EQ(read_text(at("first") / name).value(), read_text(at("second") / name).value())
-        << name;
-  }
-}
-
-TEST_F(ProgramsTest, AReplayedRecordingGivesTheSameFrames) {
-  const std::string run_it =
-      "veneerd --config " + text("veneer.toml") + " --set frames=3 --set 'output.folder=\"";
-  const Outcome live =
-      run(run_it + "live\"' --set tracker.latency_ms=0 --set 'record=\"poses.jsonl\"'");
-  ASSERT_EQ(live.exit_code, 0) << live.err;
-  const Outcome replayed =
-      run(run_it + "replayed\"' --set 'tracker={driver=\"replay\", file=\"poses.jsonl\"}'");
-  ASSERT_EQ(replayed.exit_code, 0) << replayed.err;
-  for (int frame = 0; frame < 3; ++frame) {
-    const std::string name = fmt::format("frame-{:06}.png", frame);
-    EXPECT_EQ(read_text(at("live") / name).value(), read_text(at("replayed") / name).value())
-        << name;
-  }
-}
-
 TEST_F(ProgramsTest, VerifyingALaterRunSeesWhatCompensationIsWorth) {
   const std::string config = text("veneer.toml");
   ASSERT_EQ(run("veneerd --config " + config + " --set frames=2").exit_code, 0);
@@ -410,150 +287,6 @@ TEST_F(ProgramsTest, VerifyingALaterRunSeesWhatCompensationIsWorth) {
   // Eight texels say little about colour; but compensation must be worth a lot even so.
   EXPECT_GT(nlohmann::json::parse(raw.out).at("de00_mean").get<double>(),
             2 * nlohmann::json::parse(compensated.out).at("de00_mean").get<double>());
-}
-
-TEST_F(ProgramsTest, TheDaemonStopsCleanlyOnSigterm) {
-  const std::string command = fmt::format(
-      "exec {}/veneerd --quiet --config {} --set 'clock=\"monotonic\"' --set frames=0 "
-      "--set 'output={{driver=\"file\", folder=\"stopped\"}}' --set 'summary=\"stopped.json\"'",
-      VENEER_PROGRAMS,
-      text("veneer.toml"));
-  const pid_t pid = ::fork();
-  ASSERT_GE(pid, 0);
-  if (pid == 0) {
-    ::execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
-    ::_exit(127);
-  }
-  // Not before it runs: a minute is enough even under a sanitizer.
-  constexpr auto kStep = std::chrono::milliseconds(20);
-  for (int i = 0; i < 3000 && !fs::exists(at("stopped") / "frame-000001.png"); ++i) {
-    std::this_thread::sleep_for(kStep);
-  }
-  ASSERT_EQ(::kill(pid, SIGTERM), 0);
-  int status = 0;
-  ASSERT_EQ(::waitpid(pid, &status, 0), pid);
-  ASSERT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 0);
-  const auto json = nlohmann::json::parse(read_text(at("stopped.json")).value_or("{}"));
-  EXPECT_GE(json.value("frames", 0), 2);
-}
-
-/// A daemon that runs in real time without an output until it is stopped.
-class RunningDaemon {
- public:
-  RunningDaemon(const std::string& config, const std::string& name, double frame_rate_hz)
-      : log_(fmt::format("{}.log", name)) {
-    fs::remove(log_);  // of one before
-    pid_ = ::fork();
-    if (pid_ != 0) return;
-    const std::string command = fmt::format(
-        "exec {}/veneerd --config {} --set 'clock=\"monotonic\"' --set frames=0 "
-        "--set frame_rate_hz={} --set 'output={{driver=\"null\"}}' --set 'profile=\"{}\"' "
-        "--set 'summary=\"{}.json\"' 2>{}",
-        VENEER_PROGRAMS,
-        config,
-        frame_rate_hz,
-        name,
-        name,
-        log_.string());
-    ::execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
-    ::_exit(127);
-  }
-  RunningDaemon(const RunningDaemon&) = delete;
-  RunningDaemon& operator=(const RunningDaemon&) = delete;
-  ~RunningDaemon() {
-    if (pid_ > 0) ::kill(pid_, SIGKILL);
-  }
-  void hang_up() const { ::kill(pid_, SIGHUP); }
-  [[nodiscard]] std::string log() const { return read_text(log_).value_or(""); }
-  /// Waits until the log says `what` so many times; a minute is enough even under a sanitizer.
-  [[nodiscard]] bool says(std::string_view what, int times = 1) const {
-    for (int i = 0; i < 3000; ++i) {
-      const std::string text = log();
-      int found = 0;
-      for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1))
-        ++found;
-      if (found >= times) return true;
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    }
-    return false;
-  }
-  /// Its exit status.
-  int stop() {
-    ::kill(pid_, SIGTERM);
-    int status = 0;
-    ::waitpid(std::exchange(pid_, -1), &status, 0);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  }
-
- private:
-  fs::path log_;
-  pid_t pid_ = -1;
-};
-
-TEST_F(ProgramsTest, TheDaemonTakesNewProfilesAndRefusesADamagedOne) {
-  publish_profile("live");
-  RunningDaemon daemon(text("veneer.toml"), text("live"), 10);
-  ASSERT_TRUE(daemon.says("output:")) << daemon.log();
-  const std::string exchanged = "profile was exchanged";
-  for (int times = 1; times <= 3; ++times) {
-    publish_profile("live");
-    ASSERT_TRUE(daemon.says(exchanged, times)) << daemon.log();
-  }
-  daemon.hang_up();
-  ASSERT_TRUE(daemon.says(exchanged, 4)) << "what did not change is read again: " << daemon.log();
-  cut_in_half(at("live") / "vignetting.exr");
-  daemon.hang_up();
-  ASSERT_TRUE(daemon.says("vignetting.exr was changed or damaged")) << daemon.log();
-  publish_profile("live");
-  ASSERT_TRUE(daemon.says(exchanged, 5)) << daemon.log();
-  ASSERT_EQ(daemon.stop(), 0) << daemon.log();
-
-  const auto summary = nlohmann::json::parse(read_text(at("live.json")).value());
-  EXPECT_EQ(summary.at("profile_reloads"), 5);
-  EXPECT_EQ(summary.at("profile_refusals"), 1);
-  EXPECT_GT(summary.at("profile_swap_ms_max"), 0);
-}
-
-TEST_F(ProgramsTest, ExchangingProfilesDropsNoFrame) {
-  // Another program may take the machine for a moment in either run; a daemon that drops a frame
-  // for every profile does so each time.
-  constexpr int kTries = 4;
-  constexpr int kExchanges = 3;
-  bool as_few = false;
-  for (int i = 0; i < kTries && !as_few; ++i) {
-    std::array<std::uint64_t, 2> dropped{};
-    for (const bool exchange : {false, true}) {
-      publish_profile("live");
-      RunningDaemon daemon(text("veneer.toml"), text("live"), 5);
-      ASSERT_TRUE(daemon.says("output:")) << daemon.log();
-      const auto begin = std::chrono::steady_clock::now();
-      for (int times = 1; exchange && times <= kExchanges; ++times) {
-        publish_profile("live");
-        ASSERT_TRUE(daemon.says("profile was exchanged", times)) << daemon.log();
-      }
-      // Either run takes as long, so that it has as much opportunity.
-      std::this_thread::sleep_until(begin + std::chrono::seconds(2 * kExchanges));
-      ASSERT_EQ(daemon.stop(), 0) << daemon.log();
-      const auto summary = nlohmann::json::parse(read_text(at("live.json")).value());
-      EXPECT_EQ(summary.at("profile_reloads"), exchange ? kExchanges : 0);
-      dropped[exchange ? 1 : 0] = summary.at("dropped_frames").get<std::uint64_t>();
-    }
-    as_few = dropped[1] <= dropped[0];
-  }
-  EXPECT_TRUE(as_few) << "exchanging profiles dropped frames in all of " << kTries << " tries";
-}
-
-TEST_F(ProgramsTest, TheDaemonStartsWithAnOlderProfileWhereTheNewestIsDamaged) {
-  for (const char* name : {"aged", "aged.history/2026-01-02T03-04-05.678Z"}) {
-    fs::create_directories(at(name).parent_path());
-    fs::copy(at("profile"), at(name), fs::copy_options::recursive);
-  }
-  cut_in_half(at("aged") / "profile.json");
-  const Outcome outcome =
-      run("veneerd --config " + text("veneer.toml") + " --set frames=1 --set 'profile=\"aged\"'");
-  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_NE(outcome.err.find("2026-01-02T03-04-05.678Z"), std::string::npos) << outcome.err;
 }
 
 TEST_F(ProgramsTest, RenderWritesAPictureOrALuminanceImage) {

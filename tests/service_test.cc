@@ -6,6 +6,7 @@
 #include <poll.h>
 #include <pty.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -172,6 +173,7 @@ Watched watch(const std::string& address, bool terminal, const std::function<voi
   pid_t child = -1;
   const std::string program = std::string(VENEER_PROGRAMS) + "/veneer";
   const auto become = [&] {
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // never outlives a test that crashed
     ::execl(program.c_str(), "veneer", "status", "--watch", "--bus", address.c_str(), nullptr);
     ::_exit(127);
   };

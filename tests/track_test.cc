@@ -15,6 +15,7 @@
 #include "base/clock.h"
 #include "base/toml_reader.h"
 #include "tests/program.h"
+#include "tests/program_child.h"
 #include "tracking/drivers.h"
 #include "tracking/recording.h"
 
@@ -290,25 +291,15 @@ TEST_F(TrackTest, MistakesAreNamed) {
 }
 
 TEST_F(TrackTest, AStoppedRecordingIsWhole) {
-  const std::string command = fmt::format("exec {}/veneer track record {} -o {} --quiet --json >{}",
-                                          VENEER_PROGRAMS,
-                                          config_.string(),
-                                          file_.string(),
-                                          (folder_.path() / "out").string());
-  const pid_t pid = ::fork();
-  ASSERT_GE(pid, 0);
-  if (pid == 0) {
-    ::execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
-    ::_exit(127);
-  }
+  const pid_t pid = start(fmt::format("veneer track record {} -o {} --quiet --json >{}",
+                                      config_.string(),
+                                      file_.string(),
+                                      (folder_.path() / "out").string()));
   // Not before it runs: a minute is enough even under a sanitizer.
   for (int i = 0; i < 3000 && read_text(file_).value_or("").size() < 1000; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   ASSERT_EQ(::kill(pid, SIGINT), 0);
-  int status = 0;
-  ASSERT_EQ(::waitpid(pid, &status, 0), pid);
-  ASSERT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 0);
+  ASSERT_EQ(wait_for(pid), 0);
   const json written = json::parse(read_text(folder_.path() / "out").value());
   const Outcome replayed = run("veneer track replay " + file_.string() + " --json");
   EXPECT_EQ(json::parse(replayed.out).at("truncated"), false);

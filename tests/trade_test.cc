@@ -4,9 +4,6 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <signal.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <array>
 #include <chrono>
@@ -24,8 +21,7 @@
 #include "quality/ladder.h"
 #include "tests/facing_projector.h"
 #include "tests/program.h"
-
-extern char** environ;  // NOLINT(readability-redundant-declaration): POSIX leaves it to us
+#include "tests/program_child.h"
 
 namespace veneer {
 namespace {
@@ -72,20 +68,10 @@ class TradeTest : public ::testing::Test {
 
   /// Runs it and kills it after a while. Returns whether it was still at work.
   [[nodiscard]] bool killed_after(milliseconds wait, const fs::path& out) const {
-    std::istringstream words(line(out));
-    std::vector<std::string> arguments;
-    for (std::string word; words >> word;) arguments.push_back(word);
-    const std::string path = fmt::format("{}/veneer", VENEER_PROGRAMS);
-    std::vector<char*> argv;
-    for (std::string& argument : arguments) argv.push_back(argument.data());
-    argv.push_back(nullptr);
-    pid_t pid = 0;
-    EXPECT_EQ(::posix_spawn(&pid, path.c_str(), nullptr, nullptr, argv.data(), environ), 0);
+    const pid_t child = start(line(out));
     std::this_thread::sleep_for(wait);
-    ::kill(pid, SIGKILL);
-    int status = 0;
-    EXPECT_EQ(::waitpid(pid, &status, 0), pid);
-    return WIFSIGNALED(status);
+    ::kill(child, SIGKILL);
+    return wait_for(child) == 128 + SIGKILL;
   }
 
   TemporaryFolder folder_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -21,6 +22,7 @@ class Opener {
     if (::pipe(ready.data()) != 0) return;
     process_ = ::fork();
     if (process_ == 0) {
+      ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // never outlives a test that crashed
       std::FILE* file = std::fopen(path.c_str(), "r");
       const char byte = file != nullptr ? 'y' : 'n';
       if (::write(ready[1], &byte, 1) != 1) ::_exit(1);

@@ -3,10 +3,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <signal.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -17,6 +13,7 @@
 
 #include "base/files.h"
 #include "base/random.h"
+#include "base/testing/full_disk.h"
 #include "base/testing/temporary_folder.h"
 #include "capture/recording.h"
 
@@ -376,24 +373,15 @@ TEST(Session, RefusesAnotherPlansFolderAndAPlanWithoutLights) {
   EXPECT_THAT(none.error().what, HasSubstr("no lights"));
 }
 
-// A child whose files may not grow beyond a limit: what a full disk does to a write. The journal is
-// what reaches it.
+// The journal is what reaches the limit.
 TEST(Session, GoesOnAfterAFullDisk) {
   const TemporaryFolder folder;
-  const pid_t child = ::fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    ::signal(SIGXFSZ, SIG_IGN);
-    const rlimit limit{3000, 3000};
-    if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(10);
+  const int status = on_full_disk(3000, [&] {
     SmallRig rig;
     const auto outcome = run(rig, plan_of(2), folder);
-    ::_exit(!outcome && outcome.error().code == Errc::kIo ? 0 : 11);
-  }
-  int status = 0;
-  ASSERT_EQ(::waitpid(child, &status, 0), child);
-  ASSERT_TRUE(WIFEXITED(status));
-  ASSERT_EQ(WEXITSTATUS(status), 0);
+    return !outcome && outcome.error().code == Errc::kIo ? 0 : 1;
+  });
+  ASSERT_EQ(status, 0);
   SmallRig rig;
   const auto outcome = run(rig, plan_of(2), folder);
   ASSERT_TRUE(outcome) << outcome.error().what;

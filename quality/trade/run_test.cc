@@ -3,10 +3,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <signal.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <array>
 #include <cmath>
@@ -14,6 +10,7 @@
 
 #include "base/files.h"
 #include "base/image_files.h"
+#include "base/testing/full_disk.h"
 #include "base/testing/temporary_folder.h"
 #include "btf/internal_test_sets.h"
 
@@ -322,22 +319,13 @@ TEST_F(TradeRunTest, TakesAChangeOfLoadBetweenTimingRunsOutOfTheMilliseconds) {
   }
 }
 
-// A child whose files may not grow beyond a few hundred bytes: what a full disk does to a write.
 TEST_F(TradeRunTest, AFullDiskIsSaidAndCostsOnlyWhatWasUnderWay) {
   World world(folder_.path());
-  const pid_t child = ::fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    ::signal(SIGXFSZ, SIG_IGN);
-    const rlimit limit{600, 600};
-    if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(10);
+  const int status = on_full_disk(600, [&] {
     const auto full = run(world, options());
-    ::_exit(!full && full.error().code == Errc::kIo ? 0 : 11);
-  }
-  int status = 0;
-  ASSERT_EQ(::waitpid(child, &status, 0), child);
-  ASSERT_TRUE(WIFEXITED(status));
-  ASSERT_EQ(WEXITSTATUS(status), 0);
+    return !full && full.error().code == Errc::kIo ? 0 : 1;
+  });
+  ASSERT_EQ(status, 0);
   EXPECT_TRUE(run(world, options()));
 }
 
