@@ -70,6 +70,6 @@ std::string seed(bool polarised) {
 
 const veneer::FuzzedReader& veneer::fuzzed_reader() {
   using namespace btf;
-  static const FuzzedReader kReader{&read, {seed(false), seed(true)}, {512 << 10, 256}};
+  static const FuzzedReader kReader{&read, {seed(false), seed(true)}, {16 << 10, 96}};
   return kReader;
 }

@@ -69,6 +69,6 @@ Verdict read(std::string_view text) {
 const veneer::FuzzedReader& veneer::fuzzed_reader() {
   using namespace calibration;
   static const FuzzedReader kReader{
-      &read, {read_text(folder() / "profile.json").value_or("{}")}, {512 << 10, 256}};
+      &read, {read_text(folder() / "profile.json").value_or("{}")}, {16 << 10, 80}};
   return kReader;
 }

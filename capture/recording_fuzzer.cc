@@ -48,6 +48,6 @@ const veneer::FuzzedReader& veneer::fuzzed_reader() {
        R"({"picture":{"target":"sample","view":0,"light":1,"analyser":2,"exposure":0,"dark":false,)"
        R"("repeat":false},"bytes":1234,"checksum":"crc32:01234567"})"
        "\n{\"note\":\"size\",\"value\":{\"a\":[1,2.5,null]}}\n"},
-      {512 << 10, 256}};
+      {1024, 72}};
   return kReader;
 }

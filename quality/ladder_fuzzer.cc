@@ -73,7 +73,7 @@ const veneer::FuzzedReader& veneer::fuzzed_reader() {
        rungs(Ladder::kMost),
        "[[rung]]\nname = \"\\u0007 \\\"a\\\"\"\nmaterial = \"/m\"\nratio = 1e-300\nde00_mean = 0\n"
        "evaluation = \"compute\"\n"},
-      {512 << 10, 256},
+      {40 << 10, 96},
       {rungs(Ladder::kMost + 1),
        "[[rung]]\nname = \"a\"\nmaterial = \"m\"\nratio = nan\nde00_mean = inf\n",
        "rung = [{name = \"a\", material = \"m\", ratio = 1, de00_mean = 1}]\n"}};

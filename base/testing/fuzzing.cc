@@ -57,7 +57,6 @@ std::string refusal_of(std::string_view input) {
   }
   Verdict verdict;
   Use use{input.size(), 0, reader.memory.of(input.size())};
-  if (reader.buffers != nullptr) use.bound += reader.buffers(input);
   use.bytes = most_in_use([&] { verdict = reader.read(input); }, use.bound);
   if (!verdict.broken.empty()) stop(verdict.broken);
   if (use.bytes > use.bound)
@@ -89,6 +88,9 @@ extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
   std::vector<std::string> seeds = reader.seeds;
   seeds.insert(seeds.end(), reader.odd_seeds.begin(), reader.odd_seeds.end());
   for (std::size_t i = 0; i < seeds.size(); ++i) {
+    // A long one has been looked at above; libFuzzer would spend its time on it.
+    constexpr std::size_t kLongest = 2048;
+    if (seeds[i].size() > kLongest) continue;
     std::ofstream file(fmt::format("{}/seed-{}", *corpus, i), std::ios::binary);
     file << seeds[i];
   }

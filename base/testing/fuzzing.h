@@ -37,8 +37,6 @@ struct FuzzedReader {
   /// What the reader is given, where an input only says how to make it; `memory` is in proportion
   /// to that then, and the making counts for nothing.
   std::string (*make)(std::string_view input) = nullptr;
-  /// What a library takes at once for the such an input, however short it is; beside `memory`.
-  std::size_t (*buffers)(std::string_view input) = nullptr;
 };
 [[nodiscard]] const FuzzedReader& fuzzed_reader();
 

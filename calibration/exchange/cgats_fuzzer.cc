@@ -62,6 +62,6 @@ const veneer::FuzzedReader& veneer::fuzzed_reader() {
        "CCMX\nINSTRUMENT \"I\"\nDISPLAY \"D\"\nCOLOR_REP \"XYZ\"\nNUMBER_OF_FIELDS 3\n"
        "BEGIN_DATA_FORMAT\nXYZ_X XYZ_Y XYZ_Z\nEND_DATA_FORMAT\nNUMBER_OF_SETS 3\nBEGIN_DATA\n"
        "1 2 3\n0 5 6\n0 0 9\nEND_DATA\n"},
-      {512 << 10, 256}};
+      {384 << 10, 64}};
   return kReader;
 }

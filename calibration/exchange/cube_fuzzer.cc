@@ -30,6 +30,6 @@ const veneer::FuzzedReader& veneer::fuzzed_reader() {
       {"TITLE \"t\"\nLUT_3D_SIZE 2\nDOMAIN_MIN 0 0 0\nDOMAIN_MAX 1 1 1\n0 0 0\n1 0 0\n0 1 0\n"
        "1 1 0\n0 0 1\n1 0 1\n0 1 1\n1 1 1\n",
        "LUT_1D_SIZE 2\r\nLUT_1D_INPUT_RANGE 0.0 1.0\r\n# c\r\n0 0 0\r\n1e0 .5 -1\r\n"},
-      {512 << 10, 256}};
+      {512, 32}};
   return kReader;
 }

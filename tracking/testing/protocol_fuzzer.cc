@@ -56,7 +56,7 @@ const veneer::FuzzedReader& veneer::fuzzed_reader() {
     const FuzzedProtocol& fuzzed = fuzzed_protocol();
     // Four copies of the bytes and two of the samples, in arrays that double. A message may be
     // empty, and its place in a list has 16 bytes.
-    const std::size_t bytes_per_byte = fuzzed.framing == Framing::kStream ? 16 : 64;
+    const std::size_t bytes_per_byte = fuzzed.framing == Framing::kStream ? 32 : 64;
     FuzzedReader reader{&read, {}, {1024, bytes_per_byte}};
     for (const auto& pieces : fuzzed.seeds) {
       const std::string seed = encoded(pieces, fuzzed.framing);

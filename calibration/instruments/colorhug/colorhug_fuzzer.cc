@@ -33,7 +33,7 @@ const veneer::FuzzedReader& veneer::fuzzed_reader() {
                                     {"\0\x23\0\x80\x23\0\0\0\x28\0\0\x40\x10\0"s,
                                      "\0\x07\x02\0\0\0\x07\0"s,
                                      "\0\x0B\x39\x30\0\0"s},
-                                    {512 << 10, 256},
+                                    {512, 4},
                                     {"\x12\x23"s}};
   return kReader;
 }

@@ -46,6 +46,6 @@ const veneer::FuzzedReader& veneer::fuzzed_reader() {
        "\x03\nSpot read failed due to misread (x)\nHit Esc or Q to give up, any other key to "
        "retry:",
        "\xFFspotread: Error - No instrument at port 1\nany other key to use reading:"},
-      {512 << 10, 256}};
+      {512, 8}};
   return kReader;
 }

@@ -27,6 +27,6 @@ const veneer::FuzzedReader& veneer::fuzzed_reader() {
   static const FuzzedReader kReader{
       &read,
       {"0IN0E1140051720231701016800023000", "0GS00", "0GS0B", "0PO00008C00", "APOFFFFFFFF"},
-      {512 << 10, 256}};
+      {384, 8}};
   return kReader;
 }
