@@ -256,7 +256,7 @@ const veneer::FuzzedReader& veneer::fuzzed_reader() {
   using namespace btf;
   static const FuzzedReader kReader{&read,
                                     every_kind(""),
-                                    {512 << 10, 256},
+                                    {4 << 20, 256},
                                     every_kind({"\0\1\3"
                                                 "100",
                                                 6}),  // a number changed
