@@ -33,7 +33,7 @@ std::string laws_of(const SampleSet& set) {
   return "";
 }
 
-std::string read(std::string_view text) {
+Verdict read(std::string_view text) {
   static const TemporaryFolder kFolder;
   for (std::size_t i = 0; i < kFiles.size(); ++i) {
     const std::size_t end =
@@ -42,8 +42,8 @@ std::string read(std::string_view text) {
     text.remove_prefix(std::min(end + 1, text.size()));
   }
   const auto set = SampleSet::open(kFolder.path());
-  if (!set) return set.error().what.empty() ? "a refusal without a text" : "";
-  return laws_of(*set);
+  if (!set) return refused(set.error());
+  return accepted(laws_of(*set));
 }
 
 std::string seed(bool polarised) {
@@ -70,6 +70,6 @@ std::string seed(bool polarised) {
 
 const veneer::FuzzedReader& veneer::fuzzed_reader() {
   using namespace btf;
-  static const FuzzedReader kReader{&read, {seed(false), seed(true)}};
+  static const FuzzedReader kReader{&read, {seed(false), seed(true)}, {16 << 10, 96}};
   return kReader;
 }

@@ -50,15 +50,17 @@ std::string with_checksum(const std::string& text) {
   }
 }
 
-/// A refusal has a text; what was loaded passes its own check.
-std::string read(std::string_view text) {
-  for (const std::string& manifest : {std::string(text), with_checksum(std::string(text))}) {
+/// What was loaded passes its own check.
+Verdict read(std::string_view text) {
+  Verdict verdict;
+  for (const std::string& manifest : {with_checksum(std::string(text)), std::string(text)}) {
     std::ofstream(folder() / "profile.json", std::ios::binary) << manifest;
     const auto profile = ProjectorProfile::load(folder());
-    if (!profile && profile.error().what.empty()) return "a refusal without a text";
-    if (profile && !profile->check()) return "what was loaded does not pass";
+    verdict = profile ? accepted(profile->check() ? "" : "what was loaded does not pass")
+                      : refused(profile.error());
+    if (!verdict.broken.empty()) break;
   }
-  return "";
+  return verdict;
 }
 
 }  // namespace
@@ -66,6 +68,7 @@ std::string read(std::string_view text) {
 
 const veneer::FuzzedReader& veneer::fuzzed_reader() {
   using namespace calibration;
-  static const FuzzedReader kReader{&read, {read_text(folder() / "profile.json").value_or("{}")}};
+  static const FuzzedReader kReader{
+      &read, {read_text(folder() / "profile.json").value_or("{}")}, {16 << 10, 80}};
   return kReader;
 }

@@ -123,14 +123,14 @@ endfunction()
 # veneer_add_fuzzer(NAME SRCS ... [DEPS ...])
 #
 # Makes the libFuzzer program veneer_NAME_fuzzer, in a build that is instrumented for it (the preset
-# fuzz); ./dev fuzz runs each for a bounded time.
+# fuzz); ./dev fuzz runs each for a bounded time. SRCS define fuzzed_reader() (base/testing/fuzzing.h).
 add_custom_target(veneer_fuzzers)
 function(veneer_add_fuzzer name)
   if(NOT VENEER_FUZZERS)
     return()
   endif()
   cmake_parse_arguments(F "" "" "SRCS;DEPS" ${ARGN})
-  add_executable(veneer_${name}_fuzzer ${F_SRCS})
+  add_executable(veneer_${name}_fuzzer ${F_SRCS} $<TARGET_OBJECTS:veneer_fuzzing>)
   target_link_libraries(veneer_${name}_fuzzer PRIVATE ${F_DEPS})
   target_link_options(veneer_${name}_fuzzer PRIVATE -fsanitize=fuzzer)
   add_dependencies(veneer_fuzzers veneer_${name}_fuzzer)

@@ -38,24 +38,24 @@ std::string laws_of(const Config& config) {
 
 /// The first line is a setting from the command line, the rest the file. Nothing is opened: of the
 /// drivers' tables, only that of a control that connects when it is first asked is read.
-std::string read(std::string_view text) {
+Verdict read(std::string_view text) {
   static const MemoryFile kFile;
   const std::size_t end = std::min(text.find('\n'), text.size());
   kFile.write(text.substr(std::min(end + 1, text.size())));
   auto toml = TomlReader::open(kFile.path(), {std::string(text.substr(0, end))});
-  if (!toml) return toml.error().what.empty() ? "a refusal without a text" : "";
+  if (!toml) return refused(toml.error());
   const auto config = Config::read(*toml);
-  if (!config) return config.error().what.empty() ? "a refusal without a text" : "";
+  if (!config) return refused(config.error());
   TomlReader control = toml->table("control");
   const auto watch = projector::ControlWatchOptions::read(control);
   const auto pjlink = projector::PjlinkOptions::read(control);
   for (const char* const table : {"tracker", "output", "control"})
     toml->table(table).ignore_the_rest();
   const Status finished = toml->finish();
-  if (!finished) return finished.error().what.empty() ? "a refusal without a text" : "";
-  if (!watch.check()) return "a watch that does not pass its check";
-  if (pjlink && !(pjlink->time_limit > Duration{0})) return "no time limit";
-  return laws_of(*config);
+  if (!finished) return refused(finished.error());
+  if (!watch.check()) return accepted("a watch that does not pass its check");
+  if (pjlink && !(pjlink->time_limit > Duration{0})) return accepted("no time limit");
+  return accepted(laws_of(*config));
 }
 
 }  // namespace
@@ -82,6 +82,7 @@ const veneer::FuzzedReader& veneer::fuzzed_reader() {
        // Nothing but a ladder, which stands for the material.
        "service.bus = \"system\"\nscene = \"s\"\nprofile = \"p\"\n[service]\nmetrics_port = 0\n"
        "[quality]\nladder = \"l.json\"\nmode = \"deadline\"\nrung = 0\n[pacing]\nlatch = \"late\"\n"
-       "[tracker]\n[output]\n[control]\nhost = \"h\"\n"}};
+       "[tracker]\n[output]\n[control]\nhost = \"h\"\n"},
+      {16 << 10, 96}};
   return kReader;
 }

@@ -38,16 +38,21 @@ std::string number(double value) {
   return text;
 }
 
+Status check_count(std::size_t rungs) {
+  if (rungs > Ladder::kMost)
+    return fail(Errc::kInvalidOption,
+                "it has {} rungs, over {}: the materials of all are on the GPU at once; take some "
+                "out",
+                rungs,
+                Ladder::kMost);
+  return {};
+}
+
 Status check(const Ladder& ladder) {
   if (ladder.rungs.empty())
     return fail(Errc::kInvalidOption,
                 "it has no rungs; let `veneer trade` write it, or add a [[rung]]");
-  if (ladder.rungs.size() > Ladder::kMost)
-    return fail(Errc::kInvalidOption,
-                "it has {} rungs, over {}: the materials of all are on the GPU at once; take some "
-                "out",
-                ladder.rungs.size(),
-                Ladder::kMost);
+  VENEER_TRY(check_count(ladder.rungs.size()));
   const Rung* above = nullptr;
   for (const Rung& rung : ladder.rungs) {
     if (rung.material.empty())
@@ -109,7 +114,11 @@ Rung read_rung(TomlReader& toml) {
 Result<Ladder> Ladder::load(const fs::path& path) {
   VENEER_ASSIGN(TomlReader toml, TomlReader::open(path));
   Ladder ladder;
-  for (TomlReader& rung : toml.tables("rung")) ladder.rungs.push_back(read_rung(rung));
+  std::vector<TomlReader> tables = toml.tables("rung");
+  // First, so that not every mistake in each of very many is kept.
+  if (const Status few = check_count(tables.size()); !few)
+    return fail_while(fmt::format("reading {}", path.string()), few.error());
+  for (TomlReader& rung : tables) ladder.rungs.push_back(read_rung(rung));
   VENEER_TRY(toml.finish());
   if (const Status good = check(ladder); !good)
     return fail_while(fmt::format("reading {}", path.string()), good.error());

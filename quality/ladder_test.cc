@@ -84,9 +84,12 @@ TEST(Ladder, RefusesWhatCannotBeSteppedAlong) {
   std::string many;
   for (std::size_t i = 0; i <= Ladder::kMost; ++i)
     many += rung + fmt::format("ratio = {}\n", 99 - i);
+  std::string mistaken;
+  for (std::size_t i = 0; i <= Ladder::kMost; ++i) mistaken += "[[rung]]\n";
   const Refused cases[] = {
       {"", "no rungs"},
       {many, "over 8"},
+      {mistaken, "over 8"},  // and not a word on each of them
       {rung, "ratio"},
       {rung + "ratio = 0\n", "above 0"},
       {rung + "ratio = nan\n", "a finite number"},

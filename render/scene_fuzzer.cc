@@ -37,12 +37,12 @@ std::string laws_of(const Scene& scene) {
   return "";
 }
 
-std::string read(std::string_view text) {
+Verdict read(std::string_view text) {
   static const MemoryFile kFile;
   kFile.write(text);
   const auto scene = Scene::load(kFile.path());
-  if (!scene) return scene.error().what.empty() ? "a refusal without a text" : "";
-  return laws_of(*scene);
+  if (!scene) return refused(scene.error());
+  return accepted(laws_of(*scene));
 }
 
 }  // namespace
@@ -59,7 +59,8 @@ const veneer::FuzzedReader& veneer::fuzzed_reader() {
        "mesh = \"plate\"\n[observer]\neye = \"midpoint\"\nleft_eye_in_sensor = [-0.03, 0, 0]\n"
        "right_eye_in_sensor = [0.03, 0, 0]\n[[light]]\nkind = \"point\"\nposition = [1, 2, 3]\n"
        "intensity_cd = 1e3\ncolour = [1, 0.5, 0]\n[[light]]\ndirection = [0, 0, 1]\n"
-       "illuminance_lux = 1\n",
-       "mesh = \"/dev/null\"\n[[light]]\ndirection = [0, 0, 1]\nilluminance_lux = 1\n"}};
+       "illuminance_lux = 1\n"},
+      {64 << 10, 160},
+      {"mesh = \"/dev/null\"\n[[light]]\ndirection = [0, 0, 1]\nilluminance_lux = 1\n"}};
   return kReader;
 }

@@ -224,27 +224,28 @@ std::string laws_of(const Material& material) {
   return "";
 }
 
-std::string read(std::string_view text) {
-  static const MemoryFile kFile;
+/// The file that an input asks for.
+std::string make(std::string_view text) {
   Input input(text);
   const std::vector<Contents>& good = good_materials();
   Contents contents = good[input.byte() % good.size()];
   for (int changes = 0; changes < 8 && !input.empty(); ++changes) change(contents, input);
-  kFile.write(file_of(std::move(contents)));
-  const auto material = load_material(kFile.path());
-  if (!material) return material.error().what.empty() ? "a refusal without a text" : "";
-  return laws_of(**material);
+  return file_of(std::move(contents));
 }
 
-/// One untouched material of every kind, and one with a number changed.
-std::vector<std::string> seeds() {
+Verdict read(std::string_view file) {
+  static const MemoryFile kFile;
+  kFile.write(file);
+  const auto material = load_material(kFile.path());
+  if (!material) return refused(material.error());
+  return accepted(laws_of(**material));
+}
+
+/// For every kind of material the changes, before which stands which it is.
+std::vector<std::string> every_kind(const std::string& changes) {
   std::vector<std::string> all;
-  for (std::size_t i = 0; i < good_materials().size(); ++i) {
-    all.emplace_back(1, static_cast<char>(i));
-    all.push_back(std::string(1, static_cast<char>(i)) + std::string("\0\1\3"
-                                                                     "100",
-                                                                     6));
-  }
+  for (std::size_t i = 0; i < good_materials().size(); ++i)
+    all.push_back(std::string(1, static_cast<char>(i)) + changes);
   return all;
 }
 
@@ -253,6 +254,12 @@ std::vector<std::string> seeds() {
 
 const veneer::FuzzedReader& veneer::fuzzed_reader() {
   using namespace btf;
-  static const FuzzedReader kReader{&read, seeds()};
+  static const FuzzedReader kReader{&read,
+                                    every_kind(""),
+                                    {4 << 20, 256},
+                                    every_kind({"\0\1\3"
+                                                "100",
+                                                6}),  // a number changed
+                                    &make};
   return kReader;
 }

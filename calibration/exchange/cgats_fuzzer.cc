@@ -8,15 +8,14 @@ namespace veneer::calibration {
 namespace {
 
 /// A refusal is a text of printable characters; what was read can be written and read again.
-std::string read(std::string_view text) {
+std::string broken_by(const Result<MeasuredPatches>& ti3,
+                      const Result<std::vector<Eigen::Vector3d>>& ti1,
+                      const Result<ColorimeterCorrection>& ccmx) {
   const auto is_text = [](const Error& error) {
     for (const char c : error.what)
       if (c < ' ' || c > '~') return false;
     return !error.what.empty();
   };
-  const auto ti3 = parse_ti3(text, "fuzz");
-  const auto ti1 = parse_ti1(text, "fuzz");
-  const auto ccmx = parse_ccmx(text, "fuzz");
   if (!ti3 && !is_text(ti3.error())) return "the refusal of a .ti3 is no text";
   if (!ti1 && !is_text(ti1.error())) return "the refusal of a .ti1 is no text";
   if (!ccmx && !is_text(ccmx.error())) return "the refusal of a .ccmx is no text";
@@ -37,6 +36,15 @@ std::string read(std::string_view text) {
   return "";
 }
 
+Verdict read(std::string_view text) {
+  const auto ti3 = parse_ti3(text, "fuzz");
+  const auto ti1 = parse_ti1(text, "fuzz");
+  const auto ccmx = parse_ccmx(text, "fuzz");
+  const std::string broken = broken_by(ti3, ti1, ccmx);
+  if (ti3 || ti1 || ccmx || !broken.empty()) return accepted(broken);
+  return refused(ti3.error());
+}
+
 }  // namespace
 }  // namespace veneer::calibration
 
@@ -53,6 +61,7 @@ const veneer::FuzzedReader& veneer::fuzzed_reader() {
        "1 10 20 30\nEND_DATA\n",
        "CCMX\nINSTRUMENT \"I\"\nDISPLAY \"D\"\nCOLOR_REP \"XYZ\"\nNUMBER_OF_FIELDS 3\n"
        "BEGIN_DATA_FORMAT\nXYZ_X XYZ_Y XYZ_Z\nEND_DATA_FORMAT\nNUMBER_OF_SETS 3\nBEGIN_DATA\n"
-       "1 2 3\n0 5 6\n0 0 9\nEND_DATA\n"}};
+       "1 2 3\n0 5 6\n0 0 9\nEND_DATA\n"},
+      {384 << 10, 64}};
   return kReader;
 }

@@ -5,14 +5,11 @@
 #include <string>
 #include <string_view>
 
+#include "base/testing/fuzzing.h"
 #include "base/testing/law.h"
 #include "service/bus/command.h"
 
-using namespace veneer;
-using namespace veneer::service;
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
-
+namespace veneer::service {
 namespace {
 
 /// A daemon that is not to be troubled with nonsense.
@@ -86,11 +83,8 @@ Command command_of(std::string_view bytes) {
   return Snapshot{};
 }
 
-}  // namespace
-
 /// The first byte says which method, the rest is what it is called with and what the daemon says.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const std::string_view bytes(reinterpret_cast<const char*>(data), size);
+Verdict read(std::string_view bytes) {
   const Command command = command_of(bytes);
   StrictControl control(bytes);
   const Status checked = check(command);
@@ -107,5 +101,33 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   law(text == readable(text) && text.size() < 4096, "a text that cannot be logged");
   const std::string clean = readable(bytes);
   law(clean.size() == bytes.size() && readable(clean) == clean, "a text does not stay readable");
-  return 0;
+  if (!checked) return refused(checked.error());
+  return accepted();
+}
+
+/// SetLight, of the first lamp.
+std::string light(double lux) {
+  std::string bytes("\2\0\0\0\0", 5);
+  for (const double value : {lux, 0.3, 0.5, 0.8, 1.0, 0.9, 0.8})
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+  return bytes;
+}
+
+}  // namespace
+}  // namespace veneer::service
+
+const veneer::FuzzedReader& veneer::fuzzed_reader() {
+  using namespace service;
+  using namespace std::string_literals;
+  static const FuzzedReader kReader{&read,
+                                    {"\0/m/a.safetensors"s,
+                                     "\1/m/scene.toml"s,
+                                     "\1/"s + std::string(4000, 'a'),
+                                     light(300),
+                                     "\3\1"s,
+                                     "\4"s,
+                                     "\5"s},
+                                    {1024, 8},
+                                    {light(-1), "\1relative"s}};
+  return kReader;
 }

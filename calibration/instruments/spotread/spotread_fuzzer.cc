@@ -14,20 +14,23 @@ bool is_printable(const std::string& text) {
 
 /// The first byte says in what pieces the rest comes. Texts are printable and of bounded length,
 /// readings are numbers.
-std::string read(std::string_view text) {
-  if (text.empty()) return "";
+Verdict read(std::string_view text) {
+  if (text.empty()) return refused("nothing");
+  bool understood = false;
   const std::size_t piece = static_cast<unsigned char>(text[0]) + std::size_t{1};
   spotread::Output output;
   for (std::size_t at = 1; at < text.size(); at += piece) {
     output.feed(text.substr(at, piece));
     while (const auto event = output.next()) {
-      if (!event->xyz.allFinite()) return "a reading is not finite";
-      if (!is_printable(event->text)) return "a text is not printable";
-      if (event->text.size() > 2 * spotread::Output::kLongestLine) return "a text has no bounds";
+      understood = true;
+      if (!event->xyz.allFinite()) return accepted("a reading is not finite");
+      if (!is_printable(event->text)) return accepted("a text is not printable");
+      if (event->text.size() > 2 * spotread::Output::kLongestLine)
+        return accepted("a text has no bounds");
     }
-    if (!is_printable(output.complaint())) return "a complaint is not printable";
+    if (!is_printable(output.complaint())) return accepted("a complaint is not printable");
   }
-  return "";
+  return understood ? accepted() : refused("nothing that spotread says");
 }
 
 }  // namespace
@@ -42,6 +45,7 @@ const veneer::FuzzedReader& veneer::fuzzed_reader() {
        "reading: \n Result is XYZ: 211.83 218.63 232.52, D50 Lab: 1 2 3\n",
        "\x03\nSpot read failed due to misread (x)\nHit Esc or Q to give up, any other key to "
        "retry:",
-       "\xFFspotread: Error - No instrument at port 1\nany other key to use reading:"}};
+       "\xFFspotread: Error - No instrument at port 1\nany other key to use reading:"},
+      {512, 8}};
   return kReader;
 }

@@ -1,20 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <cstdint>
 #include <string>
 #include <string_view>
 
+#include "base/testing/fuzzing.h"
 #include "base/testing/law.h"
 #include "projector/control/pjlink/pjlink_protocol.h"
 
-using namespace veneer;
-using namespace veneer::projector;
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
+namespace veneer::projector {
+namespace {
 
 /// A line of any bytes, taken for everything that a line may be.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const std::string_view line(reinterpret_cast<const char*>(data), size);
+Verdict read(std::string_view line) {
   const auto greeting = pjlink::read_greeting(line);
   has_text(greeting);
   if (greeting && greeting->seed) law(greeting->seed->size() == 8, "a seed of another length");
@@ -53,5 +50,23 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string text = pjlink::readable(line);
   law(text.size() <= line.size() && pjlink::readable(text) == text,
       "a text does not stay readable");
-  return 0;
+  if (greeting || reply || mac) return accepted();
+  return refused(reply.error());
+}
+
+}  // namespace
+}  // namespace veneer::projector
+
+const veneer::FuzzedReader& veneer::fuzzed_reader() {
+  using namespace projector;
+  static const FuzzedReader kReader{
+      &read,
+      {"PJLINK 0",
+       "PJLINK 1 498e4a67",
+       "%1LAMP=15 1 2000 0",
+       "%1LAMP=ERR3",
+       "%2ACKN=00:11:22:aa:BB:cc"},
+      {2048, 16},
+      {"%1LAMP=000120", "%1LAMP=1920x1080", "%1LAMP=3B", "%1LAMP=31", "PJLINK ERRA"}};
+  return kReader;
 }
