@@ -105,7 +105,7 @@ const FuzzedReader& fuzzed_reader() {
        gltf_alone(3),
        glb(3)},
       // assimp reads an .obj, and what looks like one whatever its name, by a block of 16 MiB.
-      {(16 << 20) + (96 << 10), 128},
+      {17 << 20, 128},
       // A face without a corner, and one whose corner is no vertex.
       {"\1ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
        "float z\nproperty float s\nproperty float t\nelement face 1\nproperty list uchar int "
