@@ -48,8 +48,8 @@ class ProfileWatcher {
   ///               one that came since is looked for at once.
   /// @param raster, options  the renderer's.
   /// @param heard  called by the watching thread, or by who asks for given(), with what became of a
-  /// profile, or with kNotFound
-  ///               once where the folder has been without one for a while; may be empty.
+  ///               profile, or with kNotFound once where the folder has been without one for a
+  ///               while; may be empty.
   ProfileWatcher(std::filesystem::path folder,
                  const std::optional<FileIdentity>& known,
                  const render::RasterFormat& raster,
