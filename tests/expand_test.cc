@@ -235,10 +235,10 @@ TEST_F(ExpandTest, RefusesWhatItCannotExpandAndLeavesEverythingAsItWas) {
   for (const auto& [size, message] :
        {std::pair("5x20", "the width is 5 texels; it must be 6, which the sample has, to 16384"),
         std::pair("20x5", "the height is 5 texels"),
-        std::pair("0x0", "the width is 0 texels"),
-        std::pair("16385x20", "the width is 16385 texels"),
-        std::pair("99999999999x20", "give the texels along both sides, as in 512x512"),
-        std::pair("20.5x20", "give the texels along both sides")})
+        std::pair("0x0", "expected WIDTHxHEIGHT, 1 to 16384 each"),
+        std::pair("16385x20", "expected WIDTHxHEIGHT, 1 to 16384 each"),
+        std::pair("99999999999x20", "expected WIDTHxHEIGHT, 1 to 16384 each"),
+        std::pair("20.5x20", "expected WIDTHxHEIGHT, 1 to 16384 each")})
     EXPECT_TRUE(fails(expanded(sample_, out, fmt::format("--size={}", size)), 2, message)) << size;
   const auto with = [&](const char* patches) {
     return run(fmt::format(
