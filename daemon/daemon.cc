@@ -339,14 +339,14 @@ Status TheDaemon::blank(bool on) {
   const Stage* stage = published_;
   // The frame loop cannot wait for itself, and a start or a lost output need not be waited for.
   if (stage == nullptr || stage->loader.show_here() != nullptr) return {};
-  constexpr int kTries = 500;
-  for (int i = 0; i < kTries && wishes_.is_dark != on; ++i)
+  // A frame that is under way may take long on a slow machine; light need not be waited for.
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(on ? 5 : 1);
+  while (wishes_.is_dark != on && std::chrono::steady_clock::now() < deadline)
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   if (on && !wishes_.is_dark)
-    return fail(
-        Errc::kTimeout,
-        "blanking: the display has not said within a second that it is dark; that is asked for "
-        "and will be done when it can be; until then see to the projector itself");
+    return fail(Errc::kTimeout,
+                "blanking: the display has not said within 5 s that it is dark; that is asked for "
+                "and will be done when it can be; until then see to the projector itself");
   return {};
 }
 
